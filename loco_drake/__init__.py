@@ -1,0 +1,8 @@
+"""Quadruped locomotion learned from diverse motion, simulated in Drake.
+
+The parts, in the order in which motion flows through them: :mod:`datasets`,
+:mod:`retargeting`, :mod:`generation`, :mod:`systems`, :mod:`tracking`,
+:mod:`evaluation`; the robots are in :mod:`models`.
+"""
+
+__version__ = "0.1.0"

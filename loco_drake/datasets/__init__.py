@@ -1,0 +1,1 @@
+"""Readers of recorded motion, one module per source."""

@@ -1,0 +1,1 @@
+"""Motion as tokens: features, tokenizer (VQ-VAE) and generator (GPT)."""

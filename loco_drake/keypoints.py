@@ -1,0 +1,60 @@
+"""Motion of any four-legged source as six points in space."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.errors import InputError
+from loco_drake.gaits import SOURCES
+from loco_drake.errors import check_choice
+
+# Feet in the order of every array with a leg axis; left is +y.
+LEGS = ("FL", "FR", "RL", "RR")
+
+
+@dataclass(frozen=True)
+class KeypointClip:
+    """Withers, hip and four toes over time, in metres, Z up, X forward.
+
+    The ground is the plane z = 0 and the clip starts heading along +x. These are what
+    :mod:`loco_drake.retargeting` needs of an animal or robot and all that it gets.
+
+    Attributes:
+        source: one of :data:`loco_drake.gaits.SOURCES`.
+        gait: name of the gait; need not be one of the fifteen labels.
+        fps: frames per second of the arrays, the source's own rate.
+        withers: position of the withers, shape (T, 3).
+        hip: position of the hip (top of the pelvis), shape (T, 3).
+        toes: positions of the toes, shape (T, 4, 3), legs FL, FR, RL, RR.
+        provenance: where the frames come from, as text (file, frames, licence, ...).
+    """
+
+    source: str
+    gait: str
+    fps: float
+    withers: NDArray[np.float64]
+    hip: NDArray[np.float64]
+    toes: NDArray[np.float64]
+    provenance: dict[str, str]
+
+    def __post_init__(self) -> None:
+        check_choice("source", self.source, SOURCES)
+        if not (np.isfinite(self.fps) and self.fps > 0):
+            raise InputError(
+                f"A keypoint clip needs a rate above 0 frames/s, not {self.fps}."
+            )
+        frames = len(self.withers)
+        shapes = {"withers": (frames, 3), "hip": (frames, 3), "toes": (frames, 4, 3)}
+        for name, shape in shapes.items():
+            value = getattr(self, name)
+            if value.shape != shape:
+                raise InputError(
+                    f"The {name} of a keypoint clip must have shape {shape}, "
+                    f"not {value.shape}."
+                )
+            if not np.isfinite(value).all():
+                raise InputError(f"The {name} of a keypoint clip hold NaN or infinity.")
+
+    def __len__(self) -> int:
+        return len(self.withers)

@@ -1,0 +1,1 @@
+"""From keypoints of an animal to motion of a robot."""

@@ -1,0 +1,1 @@
+"""The Gymnasium environment and the training of the tracking policy."""

@@ -1,0 +1,1 @@
+"""The robots, ready for Drake, and the pretrained weights."""

@@ -1,0 +1,1 @@
+"""The Drake systems, the scenario schema and the diagram builder."""

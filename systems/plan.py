@@ -1,0 +1,120 @@
+"""The one type that generator, smoother, player, policy and reward exchange."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.models.kinematics import toe_positions
+from loco_drake.models.robots import Robot
+from loco_drake.motion import FPS, Motion
+from loco_drake.rotations import quat_rotate
+
+Array = NDArray[np.float64]
+
+PLAN_DT = 1.0 / FPS
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """An immutable stretch of motion on its own clock, sampled every PLAN_DT.
+
+    Sample k is due at context time ``start_time + k * PLAN_DT``. ``q`` and ``v`` are
+    in the order of the robot's MultibodyPlant: ``q = [R_WB as w x y z, p_WB, joints]``
+    and ``v = [w_WB_W, v_WB_W, joint velocities]``.
+
+    A Plan is held in abstract state and compared by identity; copying one returns the
+    same object, since Drake copies all abstract state at each unrestricted update.
+
+    Attributes:
+        start_time: context time in s of the first sample.
+        q: positions, shape (N, 7 + J).
+        v: velocities, shape (N, 6 + J).
+        p_WF: centres of the toe spheres in m, shape (N, 4, 3).
+        contacts: whether each foot is meant to be on the ground, shape (N, 4).
+        labels: index into :data:`loco_drake.gaits.LABELS`, shape (N,).
+        path_time: seconds of the unsmoothed motion that have passed, shape (N,);
+            the smoother slows this clock down where the robot cannot follow.
+    """
+
+    start_time: float
+    q: Array
+    v: Array
+    p_WF: Array
+    contacts: NDArray[np.bool_]
+    labels: NDArray[np.int64]
+    path_time: Array
+
+    def __post_init__(self) -> None:
+        for name in ("q", "v", "p_WF", "contacts", "labels", "path_time"):
+            value = getattr(self, name)
+            if len(value) != len(self.q):
+                raise ValueError(f"{name} has {len(value)} samples, q {len(self.q)}")
+            value.setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def __copy__(self) -> "Plan":
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Plan":
+        return self
+
+    @property
+    def end_time(self) -> float:
+        """Context time in s of the last sample."""
+        return self.start_time + (len(self) - 1) * PLAN_DT
+
+    def index(self, time: float) -> int:
+        """Returns the sample nearest to ``time``, at the ends the first or last."""
+        k = round((time - self.start_time) / PLAN_DT)
+        return min(max(k, 0), len(self) - 1)
+
+
+def make_plan(
+    robot: Robot,
+    *,
+    q: Array,
+    v: Array,
+    contacts: NDArray[np.bool_],
+    labels: NDArray[np.int64],
+    start_time: float = 0.0,
+    path_time: Array | None = None,
+) -> Plan:
+    """Returns a Plan, its toes computed from ``q`` by the robot's kinematics."""
+    p_BF = toe_positions(robot, q[:, 7:])
+    p_WF = q[:, None, 4:7] + quat_rotate(q[:, None, :4], p_BF)
+    if path_time is None:
+        path_time = np.arange(len(q)) * PLAN_DT
+    return Plan(start_time, q, v, p_WF, contacts, labels, path_time)
+
+
+def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> Plan:
+    """Returns ``motion`` as a Plan for ``robot``.
+
+    Raises:
+        ValueError: if the motion is not at :data:`loco_drake.motion.FPS`, or is of
+            another robot.
+    """
+    if motion.fps != FPS:
+        raise ValueError(f"the motion is at {motion.fps} frames/s, plans are at {FPS}")
+    if motion.joint_names != robot.joint_names:
+        raise ValueError(f"the motion is of {motion.robot}, the robot is {robot.name}")
+    return make_plan(
+        robot,
+        q=np.hstack(
+            (motion.base_quaternion, motion.base_position, motion.joint_positions)
+        ),
+        v=np.hstack(
+            (
+                motion.base_angular_velocity,
+                motion.base_velocity,
+                motion.joint_velocities,
+            )
+        ),
+        contacts=motion.contacts.copy(),
+        labels=np.full(len(motion), motion.label.index),
+        start_time=start_time,
+    )
