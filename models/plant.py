@@ -1,0 +1,139 @@
+"""A robot on flat ground as a MultibodyPlant, ready to be driven."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import (
+    AddContactMaterial,
+    Box,
+    HalfSpace,
+    ProximityProperties,
+    SceneGraph,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import (
+    AddMultibodyPlant,
+    CoulombFriction,
+    MultibodyPlant,
+    MultibodyPlantConfig,
+)
+from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import DiagramBuilder
+
+from loco_drake.errors import InputError, check_choice
+
+from .robots import AddRobotModel, Robot
+
+CONTACTS = ("similar", "lagged", "sap", "cenic")
+
+# So much stiffer than the feet that theirs is the stiffness of the contact:
+# k = k_foot k_ground / (k_foot + k_ground).
+_GROUND_STIFFNESS = 1e9
+
+
+# Not frozen: yaml_load_typed sets the fields one by one.
+@dataclass(kw_only=True)
+class PlantConfig:
+    """How to simulate a robot; docs/contact.md says why these are the defaults."""
+
+    # Step of the discrete plant in s; not used by "cenic".
+    time_step: float = 0.01
+    # Drake's contact approximation of the discrete plant, or "cenic" for a continuous
+    # plant whose integrator has error control; one of CONTACTS.
+    contact: str = "similar"
+    # Accuracy of the CENIC integrator.
+    accuracy: float = 1e-3
+    # Coulomb friction of the ground. The feet have .8, and the coefficient of a contact
+    # is the harmonic mean of the two.
+    friction: float = 0.8
+    # Whether to load meshes, for Meshcat.
+    visual: bool = False
+
+    def check(self) -> None:
+        """Raises InputError unless every field is sound."""
+        check_choice("contact", self.contact, CONTACTS)
+        for name in ("time_step", "accuracy", "friction"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise InputError(f"The plant's {name} must be above 0, not {value}.")
+
+
+def AddRobotPlant(
+    builder: DiagramBuilder, robot: Robot, config: PlantConfig
+) -> tuple[MultibodyPlant, SceneGraph, ModelInstanceIndex]:
+    """Adds a finalized plant with ``robot`` and a ground, and a scene graph.
+
+    The systems are named "plant" and "scene_graph". The robot stands by default: trunk
+    at (0, 0, robot.stand_height), joints at robot.stand_joints. Its PD runs inside the
+    plant, on the port ``plant.get_desired_state_input_port(instance)``, [q_d; v_d] of
+    the 12 joints; as long as that port is not connected the joints are limp. v_d must
+    be 0 (CENIC of Drake 1.51 takes it with the wrong sign).
+
+    Args:
+        builder: of the diagram that the systems are for.
+        robot: from :func:`loco_drake.models.robots.get_robot`.
+        config: contact, step and friction. With "cenic" the caller must also call
+            :func:`ConfigureSimulator`.
+
+    Returns:
+        The plant, the scene graph and the robot's model instance.
+
+    Raises:
+        InputError: if ``config`` is not sound.
+    """
+    config.check()
+    continuous = config.contact == "cenic"
+    plant_config = MultibodyPlantConfig(
+        time_step=0.0 if continuous else config.time_step, contact_model="point"
+    )
+    if not continuous:
+        plant_config.discrete_contact_approximation = config.contact
+    plant, scene_graph = AddMultibodyPlant(plant_config, builder)
+    instance = AddRobotModel(Parser(plant), robot.name, visual=config.visual)
+    _add_ground(plant, config)
+    plant.Finalize()
+    plant.SetDefaultPositions(
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, robot.stand_height, *robot.stand_joints]
+    )
+    return plant, scene_graph, instance
+
+
+def ConfigureSimulator(simulator: Simulator, config: PlantConfig) -> None:
+    """Sets up the integrator that ``config`` asks for.
+
+    Discrete plants need none; for "cenic" this installs Drake's CENIC integrator with
+    error control at ``config.accuracy`` and at most ``config.time_step`` a step.
+    """
+    if config.contact == "cenic":
+        simulator_config = SimulatorConfig(
+            integration_scheme="cenic",
+            max_step_size=config.time_step,
+            accuracy=config.accuracy,
+            use_error_control=True,
+        )
+        ApplySimulatorConfig(simulator_config, simulator)
+
+
+def _add_ground(plant: MultibodyPlant, config: PlantConfig) -> None:
+    properties = ProximityProperties()
+    AddContactMaterial(
+        dissipation=0.0,
+        point_stiffness=_GROUND_STIFFNESS,
+        friction=CoulombFriction(config.friction, config.friction),
+        properties=properties,
+    )
+    world = plant.world_body()
+    plant.RegisterCollisionGeometry(
+        world, RigidTransform(), HalfSpace(), "ground", properties
+    )
+    if config.visual:
+        # Meshcat draws no half spaces; a hair below z = 0, where its grid is.
+        plant.RegisterVisualGeometry(
+            world,
+            RigidTransform([0.0, 0.0, -0.0105]),
+            Box(40.0, 40.0, 0.02),
+            "ground",
+            np.array([0.55, 0.57, 0.6, 1.0]),
+        )

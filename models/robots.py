@@ -1,0 +1,221 @@
+"""The robots: what their models say, as numbers."""
+
+import re
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.yaml import yaml_load_typed
+from pydrake.geometry import Role, SceneGraph, Sphere
+from pydrake.multibody.parsing import PackageMap, Parser
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.systems.framework import DiagramBuilder
+
+from loco_drake.errors import check_choice
+from loco_drake.keypoints import LEGS
+
+from .meshes import AddMeshPackage
+
+Array = NDArray[np.float64]
+
+ROBOTS = ("go2", "a1")
+LEG_JOINTS = ("hip", "thigh", "calf")
+
+_MODELS = Path(__file__).parent
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A quadruped with three joints a leg, all read from its Drake model.
+
+    Arrays are read-only float64. Joints, and so actuators, are in the order of
+    ``joint_names``: legs FL, FR, RL, RR; in a leg hip (abduction), thigh, calf. B is
+    the trunk frame: x forward, y left, z up.
+
+    Attributes:
+        name: one of :data:`ROBOTS`.
+        url: the model, ``package://...``; see :func:`ConfigureParser`.
+        joint_names: names of the 12 joints.
+        joint_lower: lower position limits in rad, shape (12,).
+        joint_upper: upper position limits in rad, shape (12,).
+        joint_speed_limits: rad/s, shape (12,).
+        effort_limits: Nm at the joint, shape (12,).
+        reflected_inertia: of the rotors as seen at the joint, kg m^2, shape (12,).
+        kp: stiffness of the PD in the plant, Nm/rad, shape (12,).
+        kd: damping of the PD in the plant, Nm s/rad, shape (12,).
+        mass: of the whole robot, kg.
+        p_BHip: origins of the hip joints in m, shape (4, 3).
+        abduction_offset: y in m from the hip joint's axis to the thigh joint, positive
+            on the left, shape (4,).
+        thigh_length: thigh joint to calf joint, m.
+        calf_length: calf joint to the centre of the toe sphere, m.
+        foot_radius: of the toe sphere, m.
+        stand_joints: joints of the usual stance in rad, shape (12,).
+        stand_height: z of p_WB in m with the trunk level, the joints at
+            ``stand_joints`` and the lowest points of the toe spheres at z = 0.
+    """
+
+    name: str
+    url: str
+    joint_names: tuple[str, ...]
+    joint_lower: Array
+    joint_upper: Array
+    joint_speed_limits: Array
+    effort_limits: Array
+    reflected_inertia: Array
+    kp: Array
+    kd: Array
+    mass: float
+    p_BHip: Array
+    abduction_offset: Array
+    thigh_length: float
+    calf_length: float
+    foot_radius: float
+    stand_joints: Array
+    stand_height: float
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+
+# Not frozen: yaml_load_typed sets the fields one by one.
+@dataclass(kw_only=True)
+class RobotExtras:
+    """What a robot's YAML file adds to its URDF."""
+
+    # Joints of the usual stance in rad, shape (12,), legs FL, FR, RL, RR.
+    stand_joints: list[float] = field(default_factory=list)
+
+
+def AddModelPackages(package_map: PackageMap, *, visual: bool = True) -> None:
+    """Registers the packages that the models' URLs name.
+
+    Args:
+        package_map: of the parser or scenario that is to load the models.
+        visual: whether to register the meshes too; the first time that takes some
+            seconds, see :mod:`loco_drake.models.meshes`.
+    """
+    package_map.AddPackageXml(str(_MODELS / "package.xml"))
+    if visual:
+        AddMeshPackage(package_map)
+
+
+def ConfigureParser(parser: Parser, *, visual: bool = True) -> None:
+    """Makes the robots' models known to ``parser``; see :func:`AddModelPackages`."""
+    AddModelPackages(parser.package_map(), visual=visual)
+
+
+def AddRobotModel(parser: Parser, name: str, *, visual: bool) -> ModelInstanceIndex:
+    """Adds a robot to the parser's plant.
+
+    Args:
+        parser: of a plant that is not finalized.
+        name: one of :data:`ROBOTS`.
+        visual: whether to load the meshes. Without them the model is parsed five
+            times faster and nothing is converted or drawn.
+
+    Raises:
+        InputError: if there is no such robot.
+    """
+    ConfigureParser(parser, visual=visual)
+    url = _url(name)
+    if visual:
+        (instance,) = parser.AddModels(url=url)
+        return instance
+    text = Path(parser.package_map().ResolveUrl(url)).read_text()
+    text = re.sub(r"<visual>.*?</visual>", "", text, flags=re.DOTALL)
+    (instance,) = parser.AddModelsFromString(file_contents=text, file_type="urdf")
+    return instance
+
+
+@lru_cache
+def get_robot(name: str) -> Robot:
+    """Returns the robot called ``name``; the model is parsed once.
+
+    Raises:
+        InputError: if there is no such robot.
+    """
+    url = _url(name)
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.01)
+    AddRobotModel(Parser(plant), name, visual=False)
+    plant.Finalize()
+    extras = yaml_load_typed(
+        schema=RobotExtras, filename=str(_MODELS / name / f"{name}.yaml")
+    )
+
+    names = tuple(f"{leg}_{part}_joint" for leg in LEGS for part in LEG_JOINTS)
+    joints = [plant.GetJointByName(joint) for joint in names]
+    actuators = [plant.GetJointActuatorByName(j.removesuffix("_joint")) for j in names]
+    gains = [actuator.get_controller_gains() for actuator in actuators]
+
+    # Lengths are those between frames of the model with all joints at zero.
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, [1.0, *[0.0] * (plant.num_positions() - 1)])
+    p_BHip = _origins(plant, context, [f"{leg}_hip" for leg in LEGS])
+    p_BThigh = _origins(plant, context, [f"{leg}_thigh" for leg in LEGS])
+    p_BCalf = _origins(plant, context, [f"{leg}_calf" for leg in LEGS])
+    p_BF = _origins(plant, context, [f"{leg}_foot" for leg in LEGS])
+    foot_radius = _foot_radius(plant, scene_graph)
+
+    stand_joints = np.array(extras.stand_joints)
+    plant.SetPositions(context, [1.0, *[0.0] * 6, *stand_joints])
+    lowest = _origins(plant, context, [f"{leg}_foot" for leg in LEGS])[:, 2].min()
+
+    return Robot(
+        name=name,
+        url=url,
+        joint_names=names,
+        joint_lower=np.concatenate([j.position_lower_limits() for j in joints]),
+        joint_upper=np.concatenate([j.position_upper_limits() for j in joints]),
+        joint_speed_limits=np.concatenate([j.velocity_upper_limits() for j in joints]),
+        effort_limits=np.array([a.effort_limit() for a in actuators]),
+        reflected_inertia=np.array(
+            [a.default_rotor_inertia() * a.default_gear_ratio() ** 2 for a in actuators]
+        ),
+        kp=np.array([gain.p for gain in gains]),
+        kd=np.array([gain.d for gain in gains]),
+        mass=float(plant.CalcTotalMass(context)),
+        p_BHip=p_BHip,
+        abduction_offset=p_BThigh[:, 1] - p_BHip[:, 1],
+        thigh_length=float(p_BThigh[0, 2] - p_BCalf[0, 2]),
+        calf_length=float(p_BCalf[0, 2] - p_BF[0, 2]),
+        foot_radius=foot_radius,
+        stand_joints=stand_joints,
+        stand_height=float(foot_radius - lowest),
+    )
+
+
+def _url(name: str) -> str:
+    check_choice("robot", name, ROBOTS)
+    return f"package://loco_drake_models/{name}/{name}.urdf"
+
+
+def _origins(plant: MultibodyPlant, context: object, frames: list[str]) -> Array:
+    """Returns the origins of ``frames`` in B, shape (len(frames), 3)."""
+    base = plant.GetFrameByName("base")
+    return np.array(
+        [
+            plant.GetFrameByName(frame).CalcPose(context, base).translation()
+            for frame in frames
+        ]
+    )
+
+
+def _foot_radius(plant: MultibodyPlant, scene_graph: SceneGraph) -> float:
+    """Returns the radius of the toe spheres, which must be alike."""
+    inspector = scene_graph.model_inspector()
+    radii = set()
+    for leg in LEGS:
+        frame = plant.GetBodyFrameIdOrThrow(plant.GetBodyByName(f"{leg}_calf").index())
+        for geometry in inspector.GetGeometries(frame, Role.kProximity):
+            shape = inspector.GetShape(geometry)
+            if isinstance(shape, Sphere):
+                radii.add(shape.radius())
+    (radius,) = radii
+    return float(radius)
