@@ -14,6 +14,7 @@ from loco_drake.rotations import quat_rotate
 Array = NDArray[np.float64]
 
 PLAN_DT = 1.0 / FPS
+_ARRAYS = ("q", "v", "p_WF", "contacts", "labels", "path_time")
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,7 @@ class Plan:
         labels: index into :data:`loco_drake.gaits.LABELS`, shape (N,).
         path_time: seconds of the unsmoothed motion that have passed, shape (N,);
             the smoother slows this clock down where the robot cannot follow.
+        open_ended: whether whoever made the plan will write more of it.
     """
 
     start_time: float
@@ -45,9 +47,10 @@ class Plan:
     contacts: NDArray[np.bool_]
     labels: NDArray[np.int64]
     path_time: Array
+    open_ended: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("q", "v", "p_WF", "contacts", "labels", "path_time"):
+        for name in _ARRAYS:
             value = getattr(self, name)
             if len(value) != len(self.q):
                 raise ValueError(f"{name} has {len(value)} samples, q {len(self.q)}")
@@ -67,6 +70,14 @@ class Plan:
         """Context time in s of the last sample."""
         return self.start_time + (len(self) - 1) * PLAN_DT
 
+    def tail(self, first: int) -> "Plan":
+        """Returns the plan from sample ``first`` on."""
+        return Plan(
+            self.start_time + first * PLAN_DT,
+            *(getattr(self, name)[first:].copy() for name in _ARRAYS),
+            open_ended=self.open_ended,
+        )
+
     def index(self, time: float) -> int:
         """Returns the sample nearest to ``time``, at the ends the first or last."""
         k = round((time - self.start_time) / PLAN_DT)
@@ -82,13 +93,14 @@ def make_plan(
     labels: NDArray[np.int64],
     start_time: float = 0.0,
     path_time: Array | None = None,
+    open_ended: bool = False,
 ) -> Plan:
     """Returns a Plan, its toes computed from ``q`` by the robot's kinematics."""
     p_BF = toe_positions(robot, q[:, 7:])
     p_WF = q[:, None, 4:7] + quat_rotate(q[:, None, :4], p_BF)
     if path_time is None:
         path_time = np.arange(len(q)) * PLAN_DT
-    return Plan(start_time, q, v, p_WF, contacts, labels, path_time)
+    return Plan(start_time, q, v, p_WF, contacts, labels, path_time, open_ended)
 
 
 def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> Plan:
@@ -116,5 +128,27 @@ def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> P
         ),
         contacts=motion.contacts.copy(),
         labels=np.full(len(motion), motion.label.index),
+        start_time=start_time,
+    )
+
+
+def join_plans(first: Plan, second: Plan) -> Plan:
+    """Returns one plan; ``second`` must start one sample after ``first`` ends."""
+    return Plan(
+        first.start_time,
+        *(np.concatenate((getattr(first, n), getattr(second, n))) for n in _ARRAYS),
+        open_ended=second.open_ended,
+    )
+
+
+def standing_plan(robot: Robot, start_time: float = 0.0) -> Plan:
+    """Returns the plan to stand still; what ports hold before anything is planned."""
+    q = np.concatenate(([1, 0, 0, 0, 0, 0, robot.stand_height], robot.stand_joints))
+    return make_plan(
+        robot,
+        q=q[None],
+        v=np.zeros((1, len(q) - 1)),
+        contacts=np.ones((1, 4), dtype=bool),
+        labels=np.zeros(1, dtype=np.int64),
         start_time=start_time,
     )

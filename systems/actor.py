@@ -1,0 +1,106 @@
+"""The policy's network, and its weights on disk."""
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from loco_drake.errors import InputError
+from loco_drake.models.robots import Robot
+from loco_drake.motion import FPS
+from loco_drake.weights import load_into, load_weights, save_weights
+
+from .joint_targets import ACTION_SCALE
+from .observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
+
+KIND = "policy"
+OBSERVATION_CLIP = 5.0  # standard deviations
+
+
+@dataclass(kw_only=True)
+class ActorConfig:
+    """What a policy was trained for; weights that differ are refused.
+
+    Attributes:
+        robot: name of the robot.
+        labels: gait labels that it was trained on.
+        hidden: widths of the hidden layers.
+        observation_layout: names and sizes of the parts of the observation.
+        action_scale: rad per unit of action.
+        rate: actions per second.
+    """
+
+    robot: str
+    labels: list[str]
+    hidden: list[int] = field(default_factory=lambda: [256, 128])
+    observation_layout: list[list[Any]] = field(
+        default_factory=lambda: [list(part) for part in OBSERVATION_LAYOUT]
+    )
+    action_scale: float = ACTION_SCALE
+    rate: float = FPS
+
+
+class Actor(nn.Module):
+    """Normalises an observation and maps it to the mean action."""
+
+    mean: Tensor
+    variance: Tensor
+
+    def __init__(self, config: ActorConfig) -> None:
+        super().__init__()
+        self.config = config
+        self.register_buffer("mean", torch.zeros(OBSERVATION_SIZE))
+        self.register_buffer("variance", torch.ones(OBSERVATION_SIZE))
+        layers: list[nn.Module] = []
+        width = OBSERVATION_SIZE
+        for hidden in config.hidden:
+            layers += [nn.Linear(width, hidden), nn.ELU()]
+            width = hidden
+        self.layers = nn.Sequential(*layers, nn.Linear(width, 12))
+
+    def forward(self, observation: Tensor) -> Tensor:
+        """Returns actions (..., 12) for observations (..., OBSERVATION_SIZE)."""
+        normal = (observation - self.mean) / torch.sqrt(self.variance + 1e-8)
+        return self.layers(normal.clamp(-OBSERVATION_CLIP, OBSERVATION_CLIP))  # type: ignore[no-any-return]
+
+
+def save_actor(actor: Actor, path: Path, *, half: bool = False) -> None:
+    """Writes the policy's weights.
+
+    In half precision the normaliser's statistics are stored in full: their range is
+    larger than 16 bits hold.
+    """
+    tensors = dict(actor.state_dict())
+    if half:
+        tensors = {
+            name: value if name in ("mean", "variance") else value.half()
+            for name, value in tensors.items()
+        }
+    save_weights(path, KIND, tensors, asdict(actor.config))
+
+
+def load_actor(path: Path, robot: Robot) -> Actor:
+    """Reads a policy for ``robot``.
+
+    Raises:
+        InputError: if the file is damaged, or was trained for another robot or with
+            another observation, action scale or rate.
+    """
+    tensors, header = load_weights(path, KIND)
+    try:
+        config = ActorConfig(**header)
+    except TypeError:
+        raise InputError(
+            f"The policy in {path} is of another version of loco_drake."
+        ) from None
+    expected = ActorConfig(robot=robot.name, labels=config.labels, hidden=config.hidden)
+    for name, value in asdict(expected).items():
+        if getattr(config, name) != value:
+            what = name.replace("_", " ")
+            detail = f": {getattr(config, name)}, not {value}" if name == "robot" else ""
+            raise InputError(f"The policy in {path} is for another {what}{detail}.")
+    actor = Actor(config)
+    load_into(actor, tensors, path)
+    return actor.eval()

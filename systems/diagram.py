@@ -1,0 +1,179 @@
+"""The diagram of a robot that does what a plan says."""
+
+from pydrake.geometry import Meshcat
+from pydrake.geometry import MeshcatVisualizer, MeshcatVisualizerParams
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import (
+    Context,
+    Diagram,
+    DiagramBuilder,
+    LeafSystem,
+)
+
+from loco_drake.errors import InputError
+from loco_drake.models.plant import AddRobotPlant
+from loco_drake.models.robots import Robot, get_robot
+from loco_drake.motion import load_motion
+
+from .actor import load_actor
+from .joint_targets import JointTargets
+from .keypoint_visualizer import KeypointVisualizer
+from .observation import Observation
+from .plan import Plan, plan_from_motion
+from .plan_player import PlanPlayer
+from .plan_state import PlanState
+from .pretrained import policy_path
+from .scenario import (
+    ExternalAction,
+    GeneratedReference,
+    MotionReference,
+    Scenario,
+)
+from .toppra_smoother import ToppraSmoother
+from .tracking_policy import TrackingPolicy
+from .tracking_reward import TrackingReward
+
+
+def MakeLocomotionDiagram(
+    scenario: Scenario, *, meshcat: Meshcat | None = None
+) -> Diagram:
+    """Returns the diagram that ``scenario`` describes.
+
+    .. pydrake_system::
+
+        name: LocomotionDiagram
+        input_ports:
+        - gait (optional, of a generated reference: index into LABELS)
+        - action (of ExternalAction)
+        output_ports:
+        - plan
+        - plan_state
+        - path_time
+        - state
+        - observation
+        - action
+        - net_actuation
+        - reward_terms
+
+    The subsystems are named plant, scene_graph, reference, smoother, observation,
+    policy, joint_targets, plan_state and reward. Simulate it like this, since a robot
+    must start where its plan starts::
+
+        simulator = Simulator(diagram)
+        StartOnPlan(simulator)
+        simulator.AdvanceTo(10.0)
+
+    Args:
+        scenario: what to simulate.
+        meshcat: where to draw the robot and the plan's keypoints, if anywhere.
+
+    Raises:
+        InputError: if the scenario names what does not exist.
+    """
+    robot = get_robot(scenario.robot)
+    builder = DiagramBuilder()
+    plant, scene_graph, instance = AddRobotPlant(builder, robot, scenario.plant)
+    state = plant.get_state_output_port()
+
+    reference = _AddReference(builder, robot, scenario)
+    plan = reference.GetOutputPort("plan")
+    if scenario.smoother is not None:
+        smoother = builder.AddNamedSystem(
+            "smoother", ToppraSmoother(robot, scenario.smoother)
+        )
+        builder.Connect(plan, smoother.GetInputPort("plan"))
+        plan = smoother.GetOutputPort("plan")
+        if reference.HasInputPort("path_time"):
+            builder.Connect(
+                smoother.GetOutputPort("path_time"),
+                reference.GetInputPort("path_time"),
+            )
+    builder.ExportOutput(plan, "plan")
+    if reference.HasInputPort("gait"):
+        builder.ExportInput(reference.GetInputPort("gait"), "gait")
+
+    targets = builder.AddNamedSystem("joint_targets", JointTargets(robot))
+    builder.Connect(plan, targets.GetInputPort("plan"))
+    builder.Connect(
+        targets.GetOutputPort("desired_state"),
+        plant.get_desired_state_input_port(instance),
+    )
+    observation = builder.AddNamedSystem("observation", Observation(robot))
+    builder.Connect(plan, observation.GetInputPort("plan"))
+    builder.Connect(state, observation.GetInputPort("state"))
+    builder.Connect(
+        targets.GetOutputPort("action"), observation.GetInputPort("action")
+    )
+    if isinstance(scenario.policy, ExternalAction):
+        builder.ExportInput(targets.GetInputPort("action"), "action")
+    else:
+        weights = scenario.policy.weights or policy_path(robot)
+        policy = builder.AddNamedSystem(
+            "policy", TrackingPolicy(load_actor(weights, robot))
+        )
+        builder.Connect(
+            observation.GetOutputPort("observation"), policy.GetInputPort("observation")
+        )
+        builder.Connect(policy.GetOutputPort("action"), targets.GetInputPort("action"))
+
+    reward = builder.AddNamedSystem("reward", TrackingReward(robot))
+    builder.Connect(plan, reward.GetInputPort("plan"))
+    builder.Connect(state, reward.GetInputPort("state"))
+    plan_state = builder.AddNamedSystem("plan_state", PlanState(robot))
+    builder.Connect(plan, plan_state.GetInputPort("plan"))
+
+    builder.ExportOutput(plan_state.GetOutputPort("state"), "plan_state")
+    builder.ExportOutput(plan_state.GetOutputPort("path_time"), "path_time")
+    builder.ExportOutput(state, "state")
+    builder.ExportOutput(observation.GetOutputPort("observation"), "observation")
+    builder.ExportOutput(targets.GetOutputPort("action"), "action")
+    builder.ExportOutput(plant.get_net_actuation_output_port(instance), "net_actuation")
+    builder.ExportOutput(reward.GetOutputPort("reward_terms"), "reward_terms")
+
+    if meshcat is not None:
+        MeshcatVisualizer.AddToBuilder(
+            builder, scene_graph, meshcat, MeshcatVisualizerParams()
+        )
+        drawing = builder.AddNamedSystem(
+            "plan_visualizer", KeypointVisualizer(robot, meshcat)
+        )
+        builder.Connect(plan, drawing.GetInputPort("plan"))
+    diagram = builder.Build()
+    diagram.set_name("locomotion")
+    return diagram
+
+
+def _AddReference(
+    builder: DiagramBuilder, robot: Robot, scenario: Scenario
+) -> LeafSystem:
+    reference = scenario.reference
+    if isinstance(reference, GeneratedReference):
+        # Loads torch models, which players do without.
+        from .reference_generator import ReferenceGenerator
+
+        return builder.AddNamedSystem("reference", ReferenceGenerator(robot, reference))
+    plan: Plan | None = None
+    if isinstance(reference, MotionReference):
+        plan = plan_from_motion(robot, load_motion(reference.path))
+    return builder.AddNamedSystem("reference", PlanPlayer(robot, plan))
+
+
+def StartOnPlan(simulator: Simulator) -> None:
+    """Initializes the simulator with the robot in the first state of its plan.
+
+    The plan of a generator or smoother exists only after initialization, and a robot
+    that starts elsewhere would begin with a jump.
+    """
+    simulator.Initialize()
+    context = simulator.get_mutable_context()
+    diagram = simulator.get_system()
+    PlaceOnPlan(diagram, context)
+    # Publishes (logs, Meshcat) must see the robot where it starts.
+    simulator.Initialize()
+
+
+def PlaceOnPlan(diagram: Diagram, context: Context) -> None:
+    """Sets the robot's state to that of the plan at the context's time."""
+    state = diagram.GetOutputPort("plan_state").Eval(context)
+    plant = diagram.GetSubsystemByName("plant")
+    plant.SetPositionsAndVelocities(plant.GetMyMutableContextFromRoot(context), state)

@@ -1,0 +1,25 @@
+"""When a robot counts as fallen."""
+
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.models.robots import Robot
+from loco_drake.rotations import quat_to_matrix
+
+# Tilted this far from upright, a robot does not come back to its feet.
+_MAX_TILT = np.deg2rad(60.0)
+_CORNERS = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
+
+
+def has_fallen(robot: Robot, q: NDArray[np.float64]) -> bool:
+    """Returns whether the trunk's box touches the ground or leans over 60 degrees.
+
+    Args:
+        robot: the robot.
+        q: the plant's positions, [R_WB as w x y z, p_WB, joints].
+    """
+    R_WB = quat_to_matrix(q[:4])
+    corners = q[6] + (_CORNERS * robot.trunk_size) @ R_WB[2]
+    return bool(corners.min() <= 0 or R_WB[2, 2] < np.cos(_MAX_TILT))

@@ -1,0 +1,69 @@
+"""The plan drawn as spheres beside the robot that is to follow it."""
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.geometry import Meshcat, Rgba, Sphere
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, EventStatus, LeafSystem
+
+from loco_drake.models.robots import Robot
+from loco_drake.rotations import quat_rotate
+
+from .plan import standing_plan
+
+# The colours of the paper's Figure 1.
+_FRONT = Rgba(0.1, 0.3, 0.9)
+_REAR = Rgba(0.9, 0.1, 0.1)
+_TRUNK = Rgba(0.1, 0.7, 0.2)
+_NAMES = ("FL_toe", "FR_toe", "RL_toe", "RR_toe", "withers", "hip")
+_COLORS = (_FRONT, _FRONT, _REAR, _REAR, _TRUNK, _TRUNK)
+
+
+class KeypointVisualizer(LeafSystem):
+    """Publishes the plan's toes, withers and hip to Meshcat.
+
+    .. pydrake_system::
+
+        name: KeypointVisualizer
+        input_ports:
+        - plan
+
+    Front toes are blue, rear toes red, withers and hip green. Withers and hip are drawn
+    above the robot's front and rear hip joints.
+
+    Args:
+        robot: the robot whose plan it is.
+        meshcat: where to draw.
+        path: the Meshcat path below which the spheres are.
+        period: seconds between frames; a sum of powers of two keeps times exact.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        meshcat: Meshcat,
+        path: str = "plan",
+        period: float = 1 / 64,
+    ) -> None:
+        super().__init__()
+        self._meshcat = meshcat
+        self._paths = [f"{path}/{name}" for name in _NAMES]
+        x = np.abs(robot.p_BHip[:, 0]).mean()
+        self._p_BK = np.array([[x, 0.0, 0.06], [-x, 0.0, 0.06]])
+        self._plan = self.DeclareAbstractInputPort("plan", Value(standing_plan(robot)))
+        for name, color in zip(self._paths, _COLORS, strict=True):
+            meshcat.SetObject(name, Sphere(robot.foot_radius), color)
+        self.DeclarePeriodicPublishEvent(period, 0.0, self._publish)
+        self.DeclareForcedPublishEvent(self._publish)
+
+    def _publish(self, context: Context) -> EventStatus:
+        time = context.get_time()
+        plan = self._plan.Eval(context)
+        k = plan.index(time)
+        q = plan.q[k]
+        trunk = q[4:7] + quat_rotate(q[None, :4], self._p_BK)
+        for path, p_W in zip(
+            self._paths, np.concatenate((plan.p_WF[k], trunk)), strict=True
+        ):
+            self._meshcat.SetTransform(path, RigidTransform(p_W), time)
+        return EventStatus.Succeeded()

@@ -1,0 +1,186 @@
+"""TOPP-RA along a plan: slow down where the actuators cannot follow, never speed up."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import toppra
+from numpy.typing import NDArray
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from scipy.interpolate import CubicSpline
+from toppra.algorithm import TOPPRA
+from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
+from toppra.interpolator import AbstractGeometricPath
+
+from loco_drake.models.robots import AddRobotModel, Robot
+
+from .plan import PLAN_DT
+
+Array = NDArray[np.float64]
+
+# toppra tells of infeasible problems through its logger; here they are results.
+toppra.setup_logging("ERROR")
+
+# The path clock may slow from full speed to rest in no less than this many seconds.
+_CLOCK_STOP_TIME = 0.05
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """What the actuators can do.
+
+    Attributes:
+        speed: rad/s, shape (J,).
+        acceleration: rad/s², shape (J,).
+    """
+
+    speed: Array
+    acceleration: Array
+
+
+def joint_limits(robot: Robot) -> JointLimits:
+    """Returns the robot's limits on joint speed and acceleration.
+
+    The acceleration that a joint can give its leg is ``effort_limit / M_jj``, with
+    M_jj the joint-space inertia about that joint in the standing pose, the rotor's
+    reflected inertia included: an upper bound for a leg in swing, where fast joint
+    motion happens. A leg in stance also carries load, but hardly accelerates.
+    """
+    plant = MultibodyPlant(0.0)
+    AddRobotModel(Parser(plant), robot.name, visual=False)
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, [1.0, *[0.0] * 6, *robot.stand_joints])
+    inertia = np.diag(plant.CalcMassMatrix(context))[-len(robot.joint_names) :]
+    return JointLimits(robot.joint_speed_limits, robot.effort_limits / inertia)
+
+
+class _JointPath(AbstractGeometricPath):
+    """Joint angles over plan time, and plan time itself as the last coordinate.
+
+    Limiting the speed of that last coordinate to 1 is what keeps TOPP-RA, which is
+    time-optimal, from playing the plan faster than it was written.
+    """
+
+    def __init__(self, spline: CubicSpline, start: float, end: float) -> None:
+        self._spline = spline
+        self._interval = np.array([start, end])
+
+    def __call__(self, path_positions: float | Array, order: int = 0) -> Array:
+        s = np.asarray(path_positions, dtype=np.float64)
+        clock = (s, np.ones_like(s), np.zeros_like(s))[order]
+        return np.concatenate((self._spline(s, order), clock[..., None]), axis=-1)
+
+    @property
+    def dof(self) -> int:
+        return int(self._spline.c.shape[-1]) + 1
+
+    @property
+    def path_interval(self) -> Array:
+        return self._interval
+
+    @property
+    def waypoints(self) -> tuple[Array, Array]:
+        return self._interval, self(self._interval)
+
+
+class _FreeEndTOPPRA(TOPPRA):  # type: ignore[misc]
+    """TOPP-RA that may end at any speed up to ``sd_end``, not at ``sd_end`` itself."""
+
+    def compute_controllable_sets(self, sdmin: float, sdmax: float) -> Array:
+        return super().compute_controllable_sets(0.0, sdmax)
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Progress along the plan, sampled every PLAN_DT of real time.
+
+    Attributes:
+        path_time: plan time s in s, shape (N,).
+        rate: ds/dt, at most 1, shape (N,).
+    """
+
+    path_time: Array
+    rate: Array
+
+
+def retime(
+    times: Array,
+    joints: Array,
+    limits: JointLimits,
+    *,
+    start: float,
+    end: float,
+    commit: float,
+    start_rate: float = 1.0,
+) -> Clock:
+    """Re-times the path through ``joints`` so that it keeps within ``limits``.
+
+    Where the plan is feasible as written it is left exactly alone. Otherwise TOPP-RA
+    (Pham and Pham 2018) finds the fastest clock that is never faster than the plan.
+
+    Args:
+        times: plan times of the waypoints in s, shape (N,); may reach beyond
+            ``start`` and ``end``, which makes the spline independent of both.
+        joints: waypoints in rad, shape (N, J).
+        limits: what must hold.
+        start: plan time at which to start.
+        end: plan time up to which the limits are to be satisfied.
+        commit: plan time at which to stop; what lies beyond, up to ``end``, only
+            makes sure that the motion can go on from there.
+        start_rate: ds/dt at ``start``. Lowered if the limits cannot be met from it.
+
+    Returns:
+        The clock from ``start`` on, at multiples of PLAN_DT of real time, for as long
+        as it has not passed ``commit``.
+    """
+    spline = CubicSpline(times, joints)
+    count = max(2, round((end - start) / (0.5 * PLAN_DT)))
+    grid = np.linspace(start, end, count + 1)
+    if start_rate > 1 - 1e-6 and _feasible(spline, grid, limits):
+        steps = int(np.floor((commit - start) / PLAN_DT + 1e-6))
+        return Clock(start + PLAN_DT * np.arange(steps + 1), np.ones(steps + 1))
+    rates = _solve(spline, grid, limits, start_rate)
+    return _sample(grid, rates, commit)
+
+
+def _feasible(spline: CubicSpline, grid: Array, limits: JointLimits) -> bool:
+    return bool(
+        (np.abs(spline(grid, 1)) <= limits.speed).all()
+        and (np.abs(spline(grid, 2)) <= limits.acceleration).all()
+    )
+
+
+def _solve(
+    spline: CubicSpline, grid: Array, limits: JointLimits, start_rate: float
+) -> Array:
+    """Returns ds/dt at the grid points by TOPP-RA."""
+    speed = np.append(limits.speed, 1.0)
+    acceleration = np.append(limits.acceleration, 1.0 / _CLOCK_STOP_TIME)
+    constraints = [
+        JointVelocityConstraint(np.stack((-speed, speed), axis=1)),
+        JointAccelerationConstraint(np.stack((-acceleration, acceleration), axis=1)),
+    ]
+    path = _JointPath(spline, grid[0], grid[-1])
+    solver = _FreeEndTOPPRA(constraints, path, gridpoints=grid, solver_wrapper="seidel")
+    controllable = np.sqrt(solver.compute_controllable_sets(0.0, 1.0)[0])
+    # A plan that starts outside the limits leaves no choice but a jump of the clock.
+    rate = float(np.clip(start_rate, controllable[0], controllable[1]))
+    _, rates, _ = solver.compute_parameterization(rate, 1.0)
+    if rates is None or np.isnan(rates).any():
+        raise RuntimeError("TOPP-RA found no way to play the plan within its limits")
+    return np.asarray(rates)
+
+
+def _sample(grid: Array, rates: Array, commit: float) -> Clock:
+    """Samples the clock at multiples of PLAN_DT; between grid points s̈ is constant."""
+    spans = 2 * np.diff(grid) / (rates[1:] + rates[:-1])
+    real = np.concatenate(([0.0], np.cumsum(spans)))
+    t = PLAN_DT * np.arange(int(np.floor(real[-1] / PLAN_DT + 1e-9)) + 1)
+    i = np.clip(np.searchsorted(real, t, side="right") - 1, 0, len(spans) - 1)
+    tau = t - real[i]
+    acceleration = (rates[i + 1] - rates[i]) / spans[i]
+    s = grid[i] + rates[i] * tau + 0.5 * acceleration * tau**2
+    rate = rates[i] + acceleration * tau
+    keep = s <= commit + 1e-9
+    return Clock(s[keep], np.minimum(rate[keep], 1.0))
