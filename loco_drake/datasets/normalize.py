@@ -1,0 +1,64 @@
+"""What all readers do to bring a recording into the form of a KeypointClip."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+def check_range(start: int, end: int | None, frames: int, what: str) -> tuple[int, int]:
+    """Returns ``(start, end)`` of a stretch, ``end`` exclusive and None for the last.
+
+    Raises:
+        InputError: if the stretch does not lie within ``frames`` frames.
+    """
+    stop = frames if end is None else end
+    if not 0 <= start < stop <= frames:
+        raise InputError(
+            f"Frames {start} to {stop} (exclusive) do not lie within {what}, "
+            f"which has {frames} frames."
+        )
+    return start, stop
+
+
+def ground_toes(toes: Array, percentile: float) -> Array:
+    """Returns toes (T, 4, 3) whose own low percentile of height is 0.
+
+    Markers sit at different heights on each foot, constant within a recording; each
+    foot touches the ground often enough that a low percentile is its height in stance.
+    """
+    offsets = np.percentile(toes[..., 2], percentile, axis=0)
+    grounded: Array = toes - np.stack((0 * offsets, 0 * offsets, offsets), axis=-1)
+    return grounded
+
+
+def start_along_x(
+    withers: Array, hip: Array, toes: Array
+) -> tuple[Array, Array, Array]:
+    """Returns the points turned and shifted so that the clip starts along +x.
+
+    The first frame's horizontal direction from hip to withers becomes +x, the point
+    under the middle between them the origin; heights are left alone.
+
+    Args:
+        withers: shape (T, 3).
+        hip: shape (T, 3).
+        toes: shape (T, 4, 3).
+
+    Raises:
+        InputError: if the trunk stands upright in the first frame, so that it has no
+            heading.
+    """
+    x, y, _ = withers[0] - hip[0]
+    length = np.hypot(x, y)
+    if length < 1e-6:
+        raise InputError(
+            "The clip starts with the withers right above the hip: it has no heading."
+        )
+    c, s = x / length, y / length
+    R = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    origin = (withers[0] + hip[0]) / 2 * np.array([1.0, 1.0, 0.0])
+    withers, hip, toes = ((points - origin) @ R.T for points in (withers, hip, toes))
+    return withers, hip, toes

@@ -1,0 +1,106 @@
+"""The sources of motion: where their files lie, whose they are, what reads them."""
+
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+from loco_drake.datasets.dog import read_dog
+from loco_drake.errors import InputError, check_choice
+from loco_drake.files import cache_dir
+from loco_drake.keypoints import KeypointClip
+
+DATA_VARIABLE = "LOCO_DRAKE_DATA"
+
+
+class Reader(Protocol):
+    """Reads frames ``start`` to ``end`` (exclusive) of one file as a clip."""
+
+    def __call__(
+        self, path: Path, *, gait: str, start: int = 0, end: int | None = None
+    ) -> KeypointClip:
+        """Returns the clip; raises InputError for a file of another format."""
+        ...
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """One source of motion.
+
+    Attributes:
+        source: one of :data:`loco_drake.gaits.SOURCES`.
+        folder: name of its folder inside the data folder.
+        licence: under which its files, and all that is made from them, may be used.
+        attribution: whom to name.
+        read: reads one file.
+    """
+
+    source: str
+    folder: str
+    licence: str
+    attribution: str
+    read: Reader
+
+
+DATASETS = {
+    dataset.source: dataset
+    for dataset in (
+        Dataset(
+            source="dog",
+            folder="dog_mann",
+            licence="CC BY-NC 4.0",
+            attribution="Zhang, Starke, Komura, Saito 2018 (MANN, AI4Animation)",
+            read=read_dog,
+        ),
+    )
+}
+
+
+def get_dataset(source: str) -> Dataset:
+    """Returns the dataset of a source.
+
+    Raises:
+        InputError: naming the sources that can be read.
+    """
+    return DATASETS[check_choice("source", source, DATASETS)]
+
+
+def read_clip(
+    source: str, path: Path, *, gait: str, start: int = 0, end: int | None = None
+) -> KeypointClip:
+    """Reads one stretch of one recording, its licence in the provenance.
+
+    Args:
+        source: whose format the file has, a key of :data:`DATASETS`.
+        path: the file.
+        gait: what the animal or robot does in that stretch.
+        start: first frame, from 0.
+        end: frame after the last; None for the end of the file.
+
+    Raises:
+        InputError: if the source is unknown, the file not of its format, or the
+            stretch not within it.
+    """
+    dataset = get_dataset(source)
+    clip = dataset.read(path, gait=gait, start=start, end=end)
+    origin = {"licence": dataset.licence, "attribution": dataset.attribution}
+    return replace(clip, provenance={**clip.provenance, **origin})
+
+
+def data_dir(path: Path | None = None) -> Path:
+    """Returns the folder of the recordings.
+
+    It is ``path`` if given, else that of the variable ``LOCO_DRAKE_DATA``, else
+    ``data`` in the user's cache folder.
+
+    Raises:
+        InputError: if there is no such folder.
+    """
+    given = path or os.environ.get(DATA_VARIABLE)
+    folder = Path(given) if given else cache_dir() / "data"
+    if not folder.is_dir():
+        raise InputError(
+            f"There is no data folder {str(folder)!r}: name one with --data-dir or "
+            f"the environment variable {DATA_VARIABLE}."
+        )
+    return folder

@@ -1,0 +1,118 @@
+"""Which stretch of which file holds which gait: ``segments.csv`` of the data folder."""
+
+import csv
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from loco_drake.datasets.registry import DATASETS, read_clip
+from loco_drake.errors import InputError
+from loco_drake.keypoints import KeypointClip
+
+COLUMNS = ("dataset", "file", "gait", "start_frame", "end_frame", "fps")
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of a recording that holds one gait.
+
+    Attributes:
+        source: one of :data:`loco_drake.gaits.SOURCES`.
+        path: the file.
+        gait: name of the gait; need not be one of the fifteen labels.
+        start: first frame, from 0, at the file's own rate.
+        end: frame after the last.
+        fps: frames per second of the file.
+    """
+
+    source: str
+    path: Path
+    gait: str
+    start: int
+    end: int
+    fps: float
+
+    @property
+    def name(self) -> str:
+        """Names the segment and what is made of it: ``dog-trot-dog_walk04-232-545``."""
+        return f"{self.source}-{self.gait}-{self.path.stem}-{self.start}-{self.end}"
+
+    @property
+    def seconds(self) -> float:
+        """Length of the segment."""
+        return (self.end - self.start) / self.fps
+
+    def read(self) -> KeypointClip:
+        """Returns the frames; raises InputError if the file does not hold them."""
+        return read_clip(
+            self.source, self.path, gait=self.gait, start=self.start, end=self.end
+        )
+
+
+def read_segments(data_dir: Path) -> list[Segment]:
+    """Returns the segments of all sources that can be read, in the file's order.
+
+    Raises:
+        InputError: if ``segments.csv`` is missing or damaged.
+    """
+    table = Path(data_dir) / "segments.csv"
+    sources = {dataset.folder: dataset.source for dataset in DATASETS.values()}
+    try:
+        with table.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+    except OSError:
+        raise InputError(
+            f"The data folder {str(data_dir)!r} lacks segments.csv."
+        ) from None
+    except (UnicodeDecodeError, csv.Error):
+        raise InputError(f"{table} is damaged: it is not a CSV table.") from None
+    segments = []
+    for line, row in enumerate(rows, start=2):
+        missing = [name for name in COLUMNS if not row.get(name)]
+        if missing:
+            raise InputError(f"{table}: line {line} lacks {', '.join(missing)}.")
+        if row["dataset"] not in sources:
+            continue
+        try:
+            segment = Segment(
+                source=sources[row["dataset"]],
+                path=Path(data_dir) / row["dataset"] / row["file"],
+                gait=row["gait"],
+                start=int(row["start_frame"]),
+                end=int(row["end_frame"]),
+                fps=float(row["fps"]),
+            )
+        except ValueError:
+            raise InputError(
+                f"{table}: line {line} has frames or a rate that are not numbers."
+            ) from None
+        if not (0 <= segment.start < segment.end and 0 < segment.fps < float("inf")):
+            raise InputError(
+                f"{table}: line {line} has an empty or impossible stretch."
+            )
+        segments.append(segment)
+    return segments
+
+
+def select_segments(
+    segments: Iterable[Segment], source: str | None, gaits: Iterable[str]
+) -> list[Segment]:
+    """Returns the segments of ``source`` (None: any) and of ``gaits`` (empty: any).
+
+    Raises:
+        InputError: if a gait, or everything, has no segment; names those that do.
+    """
+    of_source = [s for s in segments if source in (None, s.source)]
+    if not of_source:
+        raise InputError(
+            f"segments.csv has no stretch of the source {source or 'any'!r}."
+        )
+    available = list(dict.fromkeys(segment.gait for segment in of_source))
+    wanted = list(gaits)
+    for gait in wanted:
+        if gait not in available:
+            raise InputError(
+                f"segments.csv has no {gait!r} of {source or 'any source'}; "
+                f"the choices are {', '.join(available)}."
+            )
+    return [s for s in of_source if not wanted or s.gait in wanted]

@@ -1,0 +1,93 @@
+"""Which toes of a recording are on the ground."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.keypoints import KeypointClip
+from loco_drake.retargeting.config import ContactConfig
+from loco_drake.retargeting.smoothing import smooth
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+# The trunk's speed, against which that of a toe is judged, changes no faster than this.
+_TRUNK_SPEED_HZ = 1.0
+
+
+def detect_contacts(clip: KeypointClip, height: float, config: ContactConfig) -> Bools:
+    """Returns which toes are on the ground, by height and speed, with hysteresis.
+
+    A toe lands when it is low *and* slow, and leaves when it is high *or* fast; the
+    thresholds to leave are the wider ones. Speeds are measured against the trunk's,
+    since a dog's paw rolls faster in a gallop than in a walk. Contacts and flights too
+    short to be real are then removed.
+
+    Args:
+        clip: the recording, ground at z = 0.
+        height: the animal's stance height in m.
+        config: the thresholds.
+
+    Returns:
+        Contacts, bool, shape (T, 4).
+    """
+    toe_height = clip.toes[..., 2] / height
+    toe_speed = np.linalg.norm(_velocity(clip.toes, clip.fps), axis=-1)
+    middle = (clip.withers + clip.hip)[:, :2] / 2
+    trunk = smooth(_velocity(middle, clip.fps), _TRUNK_SPEED_HZ, clip.fps)
+    trunk_speed = np.linalg.norm(trunk, axis=-1)[:, None]
+    land_speed = np.maximum(config.land_speed, config.land_speed_ratio * trunk_speed)
+    leave_speed = np.maximum(config.leave_speed, config.leave_speed_ratio * trunk_speed)
+    lands = (toe_height < config.land_height) & (toe_speed < land_speed)
+    leaves = (toe_height > config.leave_height) | (toe_speed > leave_speed)
+
+    contacts = np.zeros(lands.shape, dtype=bool)
+    for leg in range(4):
+        raw = _hysteresis(lands[:, leg], leaves[:, leg])
+        filled = ~_without_short(~raw, round(config.shortest_swing * clip.fps))
+        shortest = round(config.shortest_stance * clip.fps)
+        contacts[:, leg] = _without_short(filled, shortest)
+    return contacts
+
+
+def intervals(flags: Bools) -> Iterator[tuple[int, int]]:
+    """Yields the runs of True in ``flags`` (T,), first frame and frame after the last."""
+    edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
+    for start, end in edges.reshape(-1, 2):
+        yield int(start), int(end)
+
+
+def resample_contacts(
+    contacts: Bools, fps: float, new_fps: float, frames: int
+) -> Bools:
+    """Returns contacts (frames, 4) at another rate, each that of the nearest frame."""
+    nearest = np.rint(np.arange(frames) * fps / new_fps).astype(int)
+    return contacts[np.minimum(nearest, len(contacts) - 1)]
+
+
+def _velocity(points: Array, fps: float) -> Array:
+    velocity: Array = np.gradient(points, 1 / fps, axis=0)
+    return velocity
+
+
+def _hysteresis(on: Bools, off: Bools) -> Bools:
+    """Returns a state that turns on with ``on`` and stays so until ``off``."""
+    state = np.zeros(on.shape, dtype=bool)
+    current = False
+    for k in range(len(on)):
+        current = (current or bool(on[k])) and not off[k]
+        state[k] = current
+    return state
+
+
+def _without_short(flags: Bools, shortest: int) -> Bools:
+    """Returns ``flags`` without runs of less than ``shortest`` frames.
+
+    Runs that the ends of the clip cut stay: their true length is not known.
+    """
+    flags = flags.copy()
+    for start, end in list(intervals(flags)):
+        if end - start < shortest and start > 0 and end < len(flags):
+            flags[start:end] = False
+    return flags
