@@ -45,7 +45,9 @@ def save_weights(
 
 
 def load_weights(path: Path, kind: str) -> tuple[dict[str, torch.Tensor], dict[str, Any]]:
-    """Returns the tensors (in 32 bits) and the config of a weights file.
+    """Returns the tensors and the config of a weights file.
+
+    What is stored in 16 bits is returned in 32, all else as it is.
 
     Raises:
         InputError: if the file is missing, damaged, of another kind or version.
@@ -70,7 +72,7 @@ def load_weights(path: Path, kind: str) -> tuple[dict[str, torch.Tensor], dict[s
     if found != kind:
         raise InputError(f"{path} holds {found} weights, but {kind} weights are needed.")
     return {
-        name: value.float() if value.is_floating_point() else value
+        name: value.float() if value.dtype == torch.float16 else value
         for name, value in tensors.items()
     }, config
 

@@ -1,0 +1,97 @@
+"""All that training needs to go on, in one safetensors file (never a pickle)."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from loco_drake.tracking.ppo import AdaptivePPO
+from loco_drake.tracking.sampler import PlanSampler
+from loco_drake.weights import load_weights, save_weights
+
+KIND = "tracker checkpoint"
+
+
+def save_checkpoint(
+    path: Path, learner: AdaptivePPO, sampler: PlanSampler, config: dict[str, Any]
+) -> None:
+    """Writes networks, optimizer, normalizer, sampler and random states.
+
+    Args:
+        path: a .safetensors file.
+        learner: what is being trained.
+        sampler: what draws its plans.
+        config: how it is trained, to be compared when it is resumed; must be JSON.
+    """
+    tensors: dict[str, Tensor] = {
+        f"policy/{name}": value for name, value in learner.policy.state_dict().items()
+    }
+    optimizer = learner.policy.optimizer.state_dict()
+    for index, moments in optimizer["state"].items():
+        for name, value in moments.items():
+            tensors[f"optimizer/{index}/{name}"] = value
+    statistics = learner.get_vec_normalize_env().obs_rms
+    tensors["normalizer/mean"] = torch.from_numpy(statistics.mean)
+    tensors["normalizer/variance"] = torch.from_numpy(statistics.var)
+    tensors["sampler/scores"] = torch.from_numpy(sampler.scores)
+    tensors["random/torch"] = torch.get_rng_state()
+    # stable-baselines3 shuffles its minibatches with numpy's global generator.
+    _, keys, position, has_gauss, gauss = np.random.get_state()  # noqa: NPY002
+    tensors["random/numpy"] = torch.from_numpy(np.asarray(keys).astype(np.int64))
+    state = {
+        "steps": learner.num_timesteps,
+        "learning_rate": learner.rate,
+        "normalizer_count": float(statistics.count),
+        "sampler_random": sampler.random.bit_generator.state,
+        "numpy_random": [int(position), int(has_gauss), float(gauss)],
+    }
+    save_weights(path, KIND, tensors, {"state": state, "config": config})
+
+
+def load_checkpoint(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """Returns the tensors and ``{"state", "config"}`` of a checkpoint.
+
+    Raises:
+        InputError: if there is none, or it is damaged.
+    """
+    return load_weights(path, KIND)
+
+
+def restore(
+    learner: AdaptivePPO,
+    sampler: PlanSampler,
+    tensors: dict[str, Tensor],
+    state: dict[str, Any],
+) -> None:
+    """Puts ``learner`` and ``sampler`` where the checkpoint left them."""
+
+    def part(name: str) -> dict[str, Tensor]:
+        prefix = f"{name}/"
+        return {
+            key.removeprefix(prefix): value
+            for key, value in tensors.items()
+            if key.startswith(prefix)
+        }
+
+    learner.policy.load_state_dict(part("policy"))
+    moments: dict[int, dict[str, Tensor]] = {}
+    for key, value in part("optimizer").items():
+        index, name = key.split("/")
+        moments.setdefault(int(index), {})[name] = value
+    optimizer = learner.policy.optimizer
+    groups = optimizer.state_dict()["param_groups"]
+    optimizer.load_state_dict({"state": moments, "param_groups": groups})
+    statistics = learner.get_vec_normalize_env().obs_rms
+    statistics.mean = part("normalizer")["mean"].numpy()
+    statistics.var = part("normalizer")["variance"].numpy()
+    statistics.count = state["normalizer_count"]
+    sampler.scores[:] = part("sampler")["scores"].numpy()
+    sampler.random.bit_generator.state = state["sampler_random"]
+    torch.set_rng_state(tensors["random/torch"])
+    position, has_gauss, gauss = state["numpy_random"]
+    keys = tensors["random/numpy"].numpy().astype(np.uint32)
+    np.random.set_state(("MT19937", keys, position, has_gauss, gauss))  # noqa: NPY002
+    learner.num_timesteps = state["steps"]
+    learner.rate = state["learning_rate"]

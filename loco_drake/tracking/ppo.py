@@ -1,0 +1,128 @@
+"""Proximal policy optimization: stable-baselines3's, with a rate set by the KL."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
+
+from loco_drake.systems.actor import OBSERVATION_CLIP, Actor, ActorConfig
+
+
+@dataclass(kw_only=True)
+class PpoConfig:
+    """Hyper-parameters.
+
+    Attributes:
+        batch: environment steps between updates.
+        minibatch: steps in a gradient step.
+        epochs: passes over a batch.
+        gamma: discount a step.
+        gae_lambda: of generalized advantage estimation.
+        clip: range of the probability ratio.
+        learning_rate: to start with.
+        target_kl: divergence that an update should have; the learning rate follows it
+            (Schulman et al. 2017; Rudin et al. 2022).
+        log_std: initial log standard deviation of the actions.
+        hidden: widths of the hidden layers of both networks.
+    """
+
+    batch: int = 4096
+    minibatch: int = 1024
+    epochs: int = 5
+    gamma: float = 0.97
+    gae_lambda: float = 0.95
+    clip: float = 0.2
+    learning_rate: float = 5e-4
+    target_kl: float = 0.012
+    log_std: float = -1.0
+    hidden: list[int] = field(default_factory=lambda: [256, 128])
+
+
+class ScaleReward(VecEnvWrapper):  # type: ignore[misc]
+    """Multiplies rewards by 1 - gamma, so that returns are between 0 and 1."""
+
+    def __init__(self, venv: VecEnv, gamma: float) -> None:
+        super().__init__(venv)
+        self._scale = 1 - gamma
+
+    def reset(self) -> Any:
+        """See VecEnv."""
+        return self.venv.reset()
+
+    def step_wait(self) -> Any:
+        """See VecEnv."""
+        observations, rewards, dones, infos = self.venv.step_wait()
+        return observations, rewards * self._scale, dones, infos
+
+
+class AdaptivePPO(PPO):  # type: ignore[misc]
+    """PPO whose learning rate keeps the KL divergence of an update near a target."""
+
+    target: float
+    rate: float
+
+    def train(self) -> None:
+        """Does one update, then sets the learning rate of the next."""
+        super().train()
+        kl = float(self.logger.name_to_value["train/approx_kl"])
+        if kl > 2 * self.target:
+            self.rate = max(self.rate / 1.5, 1e-5)
+        elif kl < self.target / 2:
+            self.rate = min(self.rate * 1.5, 3e-3)
+
+    def _update_learning_rate(self, optimizers: Any) -> None:
+        self.logger.record("train/learning_rate", self.rate)
+        for group in optimizers.param_groups:
+            group["lr"] = self.rate
+
+
+def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
+    """Returns a learner on ``environment``, its observations normalized."""
+    normalized = VecNormalize(
+        ScaleReward(environment, config.gamma),
+        norm_reward=False,
+        clip_obs=OBSERVATION_CLIP,
+        gamma=config.gamma,
+    )
+    learner = AdaptivePPO(
+        "MlpPolicy",
+        normalized,
+        learning_rate=config.learning_rate,
+        n_steps=config.batch // environment.num_envs,
+        batch_size=config.minibatch,
+        n_epochs=config.epochs,
+        gamma=config.gamma,
+        gae_lambda=config.gae_lambda,
+        clip_range=config.clip,
+        ent_coef=0.0,
+        max_grad_norm=1.0,
+        policy_kwargs={
+            "net_arch": {"pi": config.hidden, "vf": config.hidden},
+            "activation_fn": torch.nn.ELU,
+            "log_std_init": config.log_std,
+        },
+        seed=seed,
+        device="cpu",
+    )
+    learner.target = config.target_kl
+    learner.rate = config.learning_rate
+    return learner
+
+
+def export_actor(learner: AdaptivePPO, config: ActorConfig) -> Actor:
+    """Returns the learner's policy as the network that the diagram uses."""
+    actor = Actor(config)
+    trained = [
+        *learner.policy.mlp_extractor.policy_net,
+        learner.policy.action_net,
+    ]
+    with torch.no_grad():
+        for ours, theirs in zip(actor.layers, trained, strict=True):
+            ours.load_state_dict(theirs.state_dict())
+        statistics = learner.get_vec_normalize_env().obs_rms
+        actor.mean.copy_(torch.from_numpy(np.asarray(statistics.mean)))
+        actor.variance.copy_(torch.from_numpy(np.asarray(statistics.var)))
+    return actor.eval()

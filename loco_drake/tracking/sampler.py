@@ -1,0 +1,41 @@
+"""Which plan the next episode follows: more of the gaits that are still done badly."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.gaits import LABELS
+from loco_drake.systems.plan import Plan
+
+_MEMORY = 0.98  # weight of the past in a label's score, per episode
+_FLOOR = 0.1  # even a perfect gait is drawn now and then, so that it is not forgotten
+
+
+class PlanSampler:
+    """Draws labels in proportion to the return they still lack, plans uniformly.
+
+    Args:
+        plans: what to draw from; the label of a plan is that of its first sample.
+        seed: of the draws.
+    """
+
+    def __init__(self, plans: list[Plan], seed: int) -> None:
+        self._labels = np.array([int(plan.labels[0]) for plan in plans])
+        self.present = np.unique(self._labels)
+        # Mean normalized return of recent episodes, 0 to 1, by label.
+        self.scores: NDArray[np.float64] = np.zeros(len(LABELS))
+        self.random = np.random.default_rng(seed)
+
+    def draw(self) -> int:
+        """Returns the index of a plan."""
+        lack = np.maximum(1 - self.scores[self.present], _FLOOR)
+        label = self.random.choice(self.present, p=lack / lack.sum())
+        return int(self.random.choice(np.flatnonzero(self._labels == label)))
+
+    def record(self, plan: int, score: float) -> None:
+        """Takes note of the normalized return (0 to 1) of an episode on ``plan``."""
+        label = self._labels[plan]
+        self.scores[label] = _MEMORY * self.scores[label] + (1 - _MEMORY) * score
+
+    def score_by_label(self) -> dict[str, float]:
+        """Returns the mean normalized return of recent episodes, 0 to 100."""
+        return {str(LABELS[i]): 100 * float(self.scores[i]) for i in self.present}

@@ -1,0 +1,207 @@
+"""Environments in worker processes, many to a worker, as one vectorized environment."""
+
+import multiprocessing
+import signal
+from collections.abc import Sequence
+from multiprocessing.connection import Connection
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+
+from loco_drake.systems.plan import Plan
+from loco_drake.tracking.environment import EnvironmentConfig, TrackingEnv
+from loco_drake.tracking.sampler import PlanSampler
+
+
+def _work(
+    pipe: Connection,
+    plans: list[Plan],
+    config: EnvironmentConfig,
+    seeds: list[int],
+) -> None:
+    """Serves one message after the other: actions and the plans to go on with."""
+    # Ctrl-C reaches the whole group; the trainer decides what becomes of it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # All environments of a process share one diagram; each has a Context of its own.
+    environments = [TrackingEnv(plans, config) for _ in seeds]
+    for environment, seed in zip(environments, seeds, strict=True):
+        environment.reset(seed=seed)
+    try:
+        while (message := pipe.recv()) is not None:
+            actions, next_plans = message
+            results = []
+            for i, environment in enumerate(environments):
+                if actions is None:
+                    observation, info = environment.reset(
+                        options={"plan": next_plans[i]}
+                    )
+                    results.append((observation, 0.0, False, info))
+                else:
+                    results.append(_step(environment, actions[i], next_plans[i]))
+            pipe.send(results)
+    except (EOFError, BrokenPipeError):
+        pass  # The trainer is gone.
+
+
+def _step(
+    environment: TrackingEnv, action: NDArray[np.float32], next_plan: int
+) -> tuple[NDArray[np.float32], float, bool, dict[str, Any]]:
+    """Steps and, where the episode ends, resets, as VecEnv wants it."""
+    observation, reward, terminated, truncated, info = environment.step(action)
+    done = terminated or truncated
+    if done:
+        info["TimeLimit.truncated"] = truncated
+        info["terminal_observation"] = observation
+        observation, _ = environment.reset(options={"plan": next_plan})
+    return observation, reward, done, info
+
+
+class WorkerVecEnv(VecEnv):  # type: ignore[misc]
+    """``workers * per_worker`` TrackingEnvs for stable-baselines3.
+
+    Args:
+        plans: what to follow.
+        config: of each environment.
+        sampler: draws the plan of each episode and is told how it went.
+        workers: processes.
+        per_worker: environments in each; many amortise pipes and inference.
+        seed: of the environments' own randomness.
+    """
+
+    def __init__(
+        self,
+        plans: list[Plan],
+        config: EnvironmentConfig,
+        sampler: PlanSampler,
+        *,
+        workers: int,
+        per_worker: int,
+        seed: int,
+    ) -> None:
+        probe = TrackingEnv(plans, config)
+        super().__init__(
+            workers * per_worker, probe.observation_space, probe.action_space
+        )
+        self._sampler = sampler
+        self._episode_steps = config.episode_steps
+        self._per_worker = per_worker
+        self._returns = np.zeros(self.num_envs)
+        self._lengths = np.zeros(self.num_envs, dtype=int)
+        # Fork would copy the threads' locks of torch and Drake.
+        context = multiprocessing.get_context("spawn")
+        self._pipes: list[Connection] = []
+        self._processes = []
+        seeds = np.random.SeedSequence(seed).generate_state(self.num_envs).tolist()
+        for w in range(workers):
+            ours, theirs = context.Pipe()
+            own = seeds[w * per_worker : (w + 1) * per_worker]
+            process = context.Process(
+                target=_work, args=(theirs, plans, config, own), daemon=True
+            )
+            process.start()
+            theirs.close()
+            self._pipes.append(ours)
+            self._processes.append(process)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Starts a new episode everywhere; returns observations (num_envs, size)."""
+        self._send(None)
+        self._returns[:] = 0
+        self._lengths[:] = 0
+        return np.stack([result[0] for result in self._receive()])
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Tells every worker what to do."""
+        self._send(actions)
+
+    def step_wait(
+        self,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[Any]]:
+        """Returns observations, rewards, dones and infos."""
+        observations, rewards, dones, infos = map(
+            list, zip(*self._receive(), strict=True)
+        )
+        self._returns += rewards
+        self._lengths += 1
+        for i in np.flatnonzero(dones):
+            info = infos[i]
+            # Steps lost to a fall count as zero; those cut off by the plan's end do not.
+            steps = (
+                self._lengths[i]
+                if info["TimeLimit.truncated"]
+                else self._episode_steps
+            )
+            self._sampler.record(info["plan"], self._returns[i] / steps)
+            info["episode"] = {
+                "r": 100 * self._returns[i] / steps,
+                "l": int(self._lengths[i]),
+                "t": 0.0,
+            }
+            self._returns[i] = 0
+            self._lengths[i] = 0
+        return (
+            np.stack(observations),
+            np.array(rewards, dtype=np.float32),
+            np.array(dones),
+            infos,
+        )
+
+    def close(self) -> None:
+        """Ends the workers."""
+        for pipe in self._pipes:
+            try:
+                pipe.send(None)
+            except (BrokenPipeError, OSError):
+                pass
+            pipe.close()
+        for process in self._processes:
+            process.join(timeout=5)
+            if process.is_alive():
+                process.kill()
+        self._pipes, self._processes = [], []
+
+    def _send(self, actions: NDArray[np.float32] | None) -> None:
+        for w, pipe in enumerate(self._pipes):
+            own = slice(w * self._per_worker, (w + 1) * self._per_worker)
+            next_plans = [self._sampler.draw() for _ in range(self._per_worker)]
+            try:
+                pipe.send((None if actions is None else actions[own], next_plans))
+            except (BrokenPipeError, OSError):
+                raise RuntimeError("a worker process died") from None
+
+    def _receive(self) -> list[Any]:
+        results: list[Any] = []
+        for pipe in self._pipes:
+            try:
+                results += pipe.recv()
+            except (EOFError, ConnectionResetError):
+                raise RuntimeError("a worker process died") from None
+        return results
+
+    # What VecEnv asks for beyond stepping; the environments are in other processes.
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """Returns an attribute of this object, once for each environment."""
+        return [getattr(self, attr_name)] * len(self._indices(indices))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Not supported: environments are configured when they are made."""
+        raise NotImplementedError("configure environments by EnvironmentConfig")
+
+    def env_method(
+        self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any
+    ) -> list[Any]:
+        """Not supported: environments live in other processes."""
+        raise NotImplementedError("environments live in worker processes")
+
+    def env_is_wrapped(
+        self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: Any = None
+    ) -> list[bool]:
+        """Returns False for each environment: none is wrapped."""
+        return [False] * len(self._indices(indices))
+
+    def _indices(self, indices: Any) -> Sequence[int]:
+        return list(self._get_indices(indices))
