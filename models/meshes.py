@@ -1,8 +1,113 @@
-"""The vendors' meshes, converted once to a format that Drake reads."""
+"""The vendors' meshes, converted once to a format that Drake reads.
 
+Drake reads no Collada. The Go2's and A1's meshes of the PyPI package
+``example-robot-data`` are rewritten as Wavefront .obj with their colours in an .mtl
+beside it, in the user's cache. They are for drawing only.
+"""
+
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+
+import numpy as np
+import trimesh
 from pydrake.multibody.parsing import PackageMap
+
+from loco_drake.errors import InputError
+from loco_drake.files import atomic_path, cache_dir
+
+# Bumped when the converter changes, so that caches of older versions are redone.
+_VERSION = 1
+
+_FOLDERS = {"go2": "go2_description/visuals", "a1": "a1_description/meshes"}
+
+# Vertices closer than this are merged, in m. It leaves the Go2's meshes nearly as they
+# are and shrinks the A1's to two fifths, so that a static replay stays small.
+_GRAIN = {"go2": 0.0005, "a1": 0.002}
+
+_PACKAGE_XML = """<?xml version="1.0"?>
+<package format="2">
+  <name>loco_drake_meshes</name>
+  <version>{version}</version>
+  <description>Meshes of example-robot-data converted by loco_drake.</description>
+  <maintainer email="noreply@example.com">loco_drake</maintainer>
+  <license>MPL-2.0</license>
+</package>
+"""
 
 
 def AddMeshPackage(package_map: PackageMap) -> None:
-    """Registers ``loco_drake_meshes``, converting the meshes if need be."""
-    raise NotImplementedError("written next")
+    """Registers ``loco_drake_meshes``, converting the meshes the first time.
+
+    Raises:
+        InputError: if the package ``example-robot-data`` is not installed.
+    """
+    package_map.AddPackageXml(str(convert_meshes() / "package.xml"))
+
+
+def convert_meshes() -> Path:
+    """Returns the folder of the converted meshes, made if it is not up to date.
+
+    Every file is written whole or not at all and package.xml, which marks the folder
+    as complete, comes last: processes that convert at the same time do the work twice,
+    to the same end, and none sees half of it.
+
+    Raises:
+        InputError: if the package ``example-robot-data`` is not installed.
+    """
+    try:
+        vendor = distribution("example-robot-data")
+    except PackageNotFoundError:
+        raise InputError(
+            "The robots' meshes come from the package example-robot-data, "
+            "which is not installed."
+        ) from None
+    robots = Path(
+        str(vendor.locate_file("cmeel.prefix/share/example-robot-data/robots"))
+    )
+    folder = cache_dir() / "meshes"
+    stamp = _PACKAGE_XML.format(version=f"{_VERSION}.{vendor.version}")
+    package_xml = folder / "package.xml"
+    if package_xml.is_file() and package_xml.read_text() == stamp:
+        return folder
+    for robot, subfolder in _FOLDERS.items():
+        for source in sorted((robots / subfolder).glob("*.dae")):
+            _convert(source, folder / robot / f"{source.stem}.obj", _GRAIN[robot])
+    with atomic_path(package_xml) as temporary:
+        temporary.write_text(stamp)
+    return folder
+
+
+def _convert(source: Path, target: Path, grain: float) -> None:
+    """Writes the Collada file ``source`` as ``target`` (.obj) and an .mtl beside it."""
+    scene = trimesh.load_scene(source)
+    obj = [f"mtllib {target.stem}.mtl"]
+    mtl = []
+    count = 0
+    # In the scene's frame: parts of a Collada file have transforms of their own.
+    for index, part in enumerate(scene.dump()):
+        # Without normals viewers shade each face flat, which suits machined parts and
+        # halves the file.
+        mesh = trimesh.Trimesh(part.vertices, part.faces, process=False)
+        mesh.apply_scale(1 / grain)
+        mesh.merge_vertices(digits_vertex=0)
+        mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
+        mesh.remove_unreferenced_vertices()
+        mesh.apply_scale(grain)
+        obj.append(f"usemtl m{index}")
+        obj += [f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in mesh.vertices]
+        obj += [f"f {a} {b} {c}" for a, b, c in mesh.faces + count + 1]
+        count += len(mesh.vertices)
+        r, g, b = _srgb(part.visual.material.main_color)
+        mtl.append(f"newmtl m{index}\nKd {r:.3f} {g:.3f} {b:.3f}")
+    with atomic_path(target.with_suffix(".mtl")) as temporary:
+        temporary.write_text("\n".join(mtl) + "\n")
+    with atomic_path(target) as temporary:
+        temporary.write_text("\n".join(obj) + "\n")
+
+
+def _srgb(rgba: np.ndarray) -> np.ndarray:
+    """Returns sRGB in [0, 1] of a linear colour in 0..255, as Blender writes them."""
+    linear = np.asarray(rgba[:3], dtype=np.float64) / 255
+    return np.where(
+        linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055
+    )

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.geometry import (
     AddContactMaterial,
-    Box,
     HalfSpace,
     ProximityProperties,
     SceneGraph,
+    SceneGraphConfig,
 )
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
@@ -91,6 +91,11 @@ def AddRobotPlant(
     if not continuous:
         plant_config.discrete_contact_approximation = config.contact
     plant, scene_graph = AddMultibodyPlant(plant_config, builder)
+    # By default Drake prepares every shape for hydroelastic and deformable contact too,
+    # and warns that it cannot with a half space.
+    scene_graph_config = SceneGraphConfig()
+    scene_graph_config.default_proximity_properties.resolution_hint = None
+    scene_graph.set_config(scene_graph_config)
     instance = AddRobotModel(Parser(plant), robot.name, visual=config.visual)
     _add_ground(plant, config)
     plant.Finalize()
@@ -124,16 +129,8 @@ def _add_ground(plant: MultibodyPlant, config: PlantConfig) -> None:
         friction=CoulombFriction(config.friction, config.friction),
         properties=properties,
     )
-    world = plant.world_body()
+    properties.AddProperty("material", "relaxation_time", 0.0)
+    # Not drawn: Meshcat has a grid of its own at z = 0.
     plant.RegisterCollisionGeometry(
-        world, RigidTransform(), HalfSpace(), "ground", properties
+        plant.world_body(), RigidTransform(), HalfSpace(), "ground", properties
     )
-    if config.visual:
-        # Meshcat draws no half spaces; a hair below z = 0, where its grid is.
-        plant.RegisterVisualGeometry(
-            world,
-            RigidTransform([0.0, 0.0, -0.0105]),
-            Box(40.0, 40.0, 0.02),
-            "ground",
-            np.array([0.55, 0.57, 0.6, 1.0]),
-        )

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.common.yaml import yaml_load_typed
-from pydrake.geometry import Role, SceneGraph, Sphere
+from pydrake.geometry import SceneGraph, Sphere
 from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
@@ -53,6 +53,7 @@ class Robot:
         thigh_length: thigh joint to calf joint, m.
         calf_length: calf joint to the centre of the toe sphere, m.
         foot_radius: of the toe sphere, m.
+        trunk_size: of the trunk's collision box, centred at B, in m, shape (3,).
         stand_joints: joints of the usual stance in rad, shape (12,).
         stand_height: z of p_WB in m with the trunk level, the joints at
             ``stand_joints`` and the lowest points of the toe spheres at z = 0.
@@ -74,6 +75,7 @@ class Robot:
     thigh_length: float
     calf_length: float
     foot_radius: float
+    trunk_size: Array
     stand_joints: Array
     stand_height: float
 
@@ -186,6 +188,7 @@ def get_robot(name: str) -> Robot:
         thigh_length=float(p_BThigh[0, 2] - p_BCalf[0, 2]),
         calf_length=float(p_BCalf[0, 2] - p_BF[0, 2]),
         foot_radius=foot_radius,
+        trunk_size=_trunk_size(plant, scene_graph),
         stand_joints=stand_joints,
         stand_height=float(foot_radius - lowest),
     )
@@ -212,10 +215,19 @@ def _foot_radius(plant: MultibodyPlant, scene_graph: SceneGraph) -> float:
     inspector = scene_graph.model_inspector()
     radii = set()
     for leg in LEGS:
-        frame = plant.GetBodyFrameIdOrThrow(plant.GetBodyByName(f"{leg}_calf").index())
-        for geometry in inspector.GetGeometries(frame, Role.kProximity):
-            shape = inspector.GetShape(geometry)
-            if isinstance(shape, Sphere):
-                radii.add(shape.radius())
+        body = plant.GetBodyByName(f"{leg}_calf")
+        (geometry,) = plant.GetCollisionGeometriesForBody(body)
+        shape = inspector.GetShape(geometry)
+        assert isinstance(shape, Sphere)
+        radii.add(shape.radius())
     (radius,) = radii
     return float(radius)
+
+
+def _trunk_size(plant: MultibodyPlant, scene_graph: SceneGraph) -> Array:
+    """Returns the size of the one box on the trunk, which must be centred at B."""
+    inspector = scene_graph.model_inspector()
+    body = plant.GetBodyByName("base")
+    (geometry,) = plant.GetCollisionGeometriesForBody(body)
+    assert inspector.GetPoseInFrame(geometry).IsExactlyIdentity()
+    return np.array(inspector.GetShape(geometry).size())
