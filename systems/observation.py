@@ -9,7 +9,13 @@ from pydrake.systems.framework import Context, LeafSystem
 
 from loco_drake.gaits import ONE_HOT, ONE_HOT_SIZE
 from loco_drake.models.robots import Robot
-from loco_drake.rotations import quat_conjugate, quat_log, quat_multiply, quat_to_matrix
+from loco_drake.rotations import (
+    heading_matrix,
+    quat_conjugate,
+    quat_log,
+    quat_multiply,
+    quat_to_matrix,
+)
 
 from .plan import Plan, standing_plan
 
@@ -60,11 +66,9 @@ def observe(
     plan_q, plan_v = plan.q[k], plan.v[k]
 
     R_WB = quat_to_matrix(q[:4])
-    heading = R_WB[:2, 0] / max(1e-9, float(np.hypot(R_WB[0, 0], R_WB[1, 0])))
-    cos, sin = heading
     # Row vectors times R_WH are vectors expressed in H.
-    R_WH = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    R_BP = quat_log(quat_multiply(quat_conjugate(q[:4])[None], plan_q[:, :4]))
+    R_WH = heading_matrix(R_WB)
+    R_BP = quat_log(quat_multiply(quat_conjugate(q[:4]), plan_q[:, :4]))
     return np.concatenate(
         (
             -R_WB[2],

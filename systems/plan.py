@@ -1,6 +1,7 @@
 """The one type that generator, smoother, player, policy and reward exchange."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import Robot
 from loco_drake.motion import FPS, Motion
-from loco_drake.rotations import quat_rotate
+from loco_drake.rotations import quat_conjugate, quat_rotate, yaw_of, yaw_quat
 
 Array = NDArray[np.float64]
 
@@ -64,6 +65,17 @@ class Plan:
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Plan":
         return self
+
+    @cached_property
+    def state(self) -> Array:
+        """[q, v], shape (N, 13 + 2 J)."""
+        return np.hstack((self.q, self.v))
+
+    @cached_property
+    def p_BoF_H(self) -> Array:
+        """Toes relative to the base in its heading frame (z up), m, shape (N, 4, 3)."""
+        q_HW = quat_conjugate(yaw_quat(yaw_of(self.q[:, :4])))
+        return quat_rotate(q_HW[:, None], self.p_WF - self.q[:, None, 4:7])
 
     @property
     def end_time(self) -> float:

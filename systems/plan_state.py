@@ -40,8 +40,7 @@ class PlanState(LeafSystem):
 
     def _calc_state(self, context: Context, output: Any) -> None:
         plan = self._plan.Eval(context)
-        k = plan.index(context.get_time())
-        output.set_value([*plan.q[k], *plan.v[k]])
+        output.set_value(plan.state[plan.index(context.get_time())])
 
     def _calc_path_time(self, context: Context, output: Any) -> None:
         plan = self._plan.Eval(context)

@@ -9,13 +9,7 @@ from pydrake.systems.framework import Context, LeafSystem
 
 from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import Robot
-from loco_drake.rotations import (
-    quat_error,
-    quat_multiply,
-    quat_rotate,
-    yaw_of,
-    yaw_quat,
-)
+from loco_drake.rotations import heading_matrix, quat_error, quat_to_matrix
 
 from .plan import Plan, standing_plan
 
@@ -50,30 +44,28 @@ def reward_terms(robot: Robot, plan: Plan, time: float, state: Array) -> Array:
     k = plan.index(time)
     plan_q, plan_v = plan.q[k], plan.v[k]
 
-    base_q = np.stack((q[:4], plan_q[:4]))
-    p_BF = toe_positions(robot, np.stack((q[7:], plan_q[7:])))
-    q_HB = _tilt(base_q)
-    p_HF = quat_rotate(q_HB[:, None], p_BF)
+    R_WB = quat_to_matrix(q[:4])
+    # Row vectors times R_WH are vectors expressed in the heading frame H.
+    R_WH = heading_matrix(R_WB)
+    p_BoF_H = toe_positions(robot, q[7:]) @ (R_WB.T @ R_WH)
 
-    def squares(error: Array) -> float:
-        return float(np.dot(error, error))
-
+    velocity = v - plan_v
     exponents = np.array(
         [
-            5 * squares(q[7:] - plan_q[7:]),
-            0.1 * squares(v[6:] - plan_v[6:]),
-            40 * squares((p_HF[0] - p_HF[1]).ravel()),
-            20 * squares(q[4:7] - plan_q[4:7])
-            + 10 * squares(quat_error(base_q[0], base_q[1])),
-            2 * squares(v[3:6] - plan_v[3:6]) + 0.2 * squares(v[:3] - plan_v[:3]),
+            5 * _squares(q[7:] - plan_q[7:]),
+            0.1 * _squares(velocity[6:]),
+            40 * _squares((p_BoF_H - plan.p_BoF_H[k]).ravel()),
+            20 * _squares(q[4:7] - plan_q[4:7])
+            + 10 * _squares(quat_error(q[:4], plan_q[:4])),
+            2 * _squares(velocity[3:6]) + 0.2 * _squares(velocity[:3]),
         ]
     )
-    return REWARD_WEIGHTS * np.exp(-exponents)
+    terms: Array = REWARD_WEIGHTS * np.exp(-exponents)
+    return terms
 
 
-def _tilt(q_WB: Array) -> Array:
-    """Returns R_HB, the rotation of the base but for its heading."""
-    return quat_multiply(yaw_quat(-yaw_of(q_WB)), q_WB)
+def _squares(error: Array) -> float:
+    return float(error @ error)
 
 
 class TrackingReward(LeafSystem):
