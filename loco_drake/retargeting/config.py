@@ -22,10 +22,10 @@ class ContactConfig:
     leave_height: float = 0.09
     # ... and when it is slower, or faster, than these fractions of the trunk's speed,
     # or than these speeds in m/s where that is more.
-    land_speed_ratio: float = 0.25
-    leave_speed_ratio: float = 0.4
+    land_speed_ratio: float = 0.35
+    leave_speed_ratio: float = 0.5
     land_speed: float = 0.4
-    leave_speed: float = 0.6
+    leave_speed: float = 0.7
     # Shorter contacts and shorter flights are taken for noise; s.
     shortest_stance: float = 0.04
     shortest_swing: float = 0.06
@@ -36,9 +36,9 @@ class SmoothingConfig:
     """Cut-off frequencies of the zero-phase low-pass filters, in Hz."""
 
     # Of the trunk's position, heading and pitch.
-    base: float = 6.0
+    base: float = 5.0
     # Of the toes.
-    toes: float = 10.0
+    toes: float = 7.0
 
 
 @dataclass(kw_only=True)

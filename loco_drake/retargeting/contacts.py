@@ -52,7 +52,7 @@ def detect_contacts(clip: KeypointClip, height: float, config: ContactConfig) ->
 
 
 def intervals(flags: Bools) -> Iterator[tuple[int, int]]:
-    """Yields the runs of True in ``flags`` (T,), first frame and frame after the last."""
+    """Yields first frame and frame after the last of each run of True in ``flags``."""
     edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
     for start, end in edges.reshape(-1, 2):
         yield int(start), int(end)
@@ -63,7 +63,8 @@ def resample_contacts(
 ) -> Bools:
     """Returns contacts (frames, 4) at another rate, each that of the nearest frame."""
     nearest = np.rint(np.arange(frames) * fps / new_fps).astype(int)
-    return contacts[np.minimum(nearest, len(contacts) - 1)]
+    resampled: Bools = contacts[np.minimum(nearest, len(contacts) - 1)]
+    return resampled
 
 
 def _velocity(points: Array, fps: float) -> Array:

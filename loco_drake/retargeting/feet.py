@@ -74,7 +74,7 @@ def swing_clearance(contact: Bools, fps: float) -> Array:
 
 
 def _fit_ground_plane(target: Array, contact: Bools, smoothness: csc_matrix) -> Array:
-    """Returns x and y (T, 2) nearest to ``target`` that are constant in each contact."""
+    """Returns x, y (T, 2) nearest to ``target`` that are constant in each contact."""
     columns = np.cumsum(_starts_new_value(contact)) - 1
     frames = len(target)
     M = csr_matrix((np.ones(frames), (np.arange(frames), columns)))

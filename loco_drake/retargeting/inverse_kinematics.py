@@ -54,26 +54,24 @@ class LegSolver:
         )
         self._near = self._prog.AddQuadraticCost(np.eye(12), np.zeros(12), self._q)
 
-    def solve(self, p_BF: Array) -> tuple[Array, int]:
+    def solve(self, p_BF: Array) -> Array:
         """Returns joints (T, 12) in rad for toes ``p_BF`` (T, 4, 3) in m.
 
-        Also returns in how many frames the toes could not be reached within the limits
-        of position and speed; there they are as near as possible.
+        Where a toe cannot be reached within the limits of position and speed, it is
+        put as near to its target as they allow.
         """
         joints = np.empty((len(p_BF), 12))
-        unreached = 0
         previous = self._robot.stand_joints
-        lower, upper = self._robot.joint_lower, self._robot.joint_upper
+        step = np.full(12, np.inf)  # the first frame may be far from the stance
         for k, p in enumerate(p_BF):
-            if k > 0:
-                lower = np.maximum(self._robot.joint_lower, previous - self._step)
-                upper = np.minimum(self._robot.joint_upper, previous + self._step)
+            lower = np.maximum(self._robot.joint_lower, previous - step)
+            upper = np.minimum(self._robot.joint_upper, previous + step)
             solution = self._solve_exactly(p, previous, lower, upper)
             if solution is None:
                 solution = self._solve_nearly(p, previous, lower, upper)
-                unreached += 1
-            previous = joints[k] = np.clip(solution, lower, upper)
-        return joints, unreached
+            joints[k] = np.clip(solution, lower, upper)
+            previous, step = joints[k], self._step
+        return joints
 
     def _solve_exactly(
         self, p_BF: Array, previous: Array, lower: Array, upper: Array

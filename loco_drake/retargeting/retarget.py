@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from loco_drake.gaits import GaitLabel
 from loco_drake.keypoints import KeypointClip
+from loco_drake.models.kinematics import leg_joints, toe_positions
 from loco_drake.models.robots import Robot
 from loco_drake.motion import FPS, Motion, make_motion
 from loco_drake.retargeting import quality
@@ -22,9 +23,7 @@ from loco_drake.retargeting.scaling import (
     stance_height,
 )
 from loco_drake.retargeting.smoothing import smooth
-from loco_drake.rotations import quat_conjugate, quat_rotate
-
-Array = NDArray[np.float64]
+from loco_drake.rotations import quat_rotate
 
 
 @dataclass(frozen=True)
@@ -81,10 +80,7 @@ def retarget_clip(
     formula = scale_to_robot(resampled, height, robot, config)
     contacts = resample_contacts(raw_contacts, clip.fps, FPS, len(resampled))
     targets = correct(formula, contacts, robot, config)
-    p_BF = quat_rotate(
-        quat_conjugate(targets.q_WB)[:, None], targets.p_WF - targets.p_WB[:, None]
-    )
-    joints, unreached = solver.solve(p_BF)
+    joints = solver.solve(targets.p_BF)
     motion = make_motion(
         robot=robot.name,
         label=GaitLabel(clip.source, clip.gait),
@@ -108,7 +104,8 @@ def retarget_clip(
         joint_speed_ratio_max=quality.joint_speed_ratio_max(joints, robot, FPS),
         scale=robot.stand_height / height,
     )
-    figures = {name: f"{value:.6g}" for name, value in vars(report).items() if value}
+    kept = ("scale", "toe_error_rmse_m", "correction_rmse_m")
+    figures = {name: f"{getattr(report, name):.6g}" for name in kept}
     return replace(motion, provenance={**motion.provenance, **figures}), report
 
 
@@ -118,11 +115,29 @@ def correct(
     robot: Robot,
     config: RetargetConfig,
 ) -> Targets:
-    """Returns targets that a robot can follow: smooth, feet still in contact."""
+    """Returns targets at 50 Hz that a robot can follow, near to the formula's.
+
+    Trunk and toes move smoothly, toes in contact stand still on the ground, those that
+    swing stay above it, and none is further than its leg reaches.
+    """
     smoothing = config.smoothing
-    return Targets(
+    targets = Targets(
         p_WB=smooth(formula.p_WB, smoothing.base, FPS),
         yaw=smooth(formula.yaw, smoothing.base, FPS),
         pitch=smooth(formula.pitch, smoothing.base, FPS),
         p_WF=plant_feet(formula.p_WF, contacts, robot.foot_radius, smoothing.toes, FPS),
     )
+    return within_reach(targets, robot)
+
+
+def within_reach(targets: Targets, robot: Robot) -> Targets:
+    """Returns ``targets`` with toes that the joints' limits do not allow moved nearer.
+
+    A leg that is too short points at its target, which comes to lie at its end.
+    """
+    p_BF = targets.p_BF
+    joints = np.clip(leg_joints(robot, p_BF), robot.joint_lower, robot.joint_upper)
+    reachable = toe_positions(robot, joints)
+    beyond = np.linalg.norm(reachable - p_BF, axis=-1, keepdims=True) > 1e-9
+    p_WF = targets.p_WB[:, None] + quat_rotate(targets.q_WB[:, None], reachable)
+    return replace(targets, p_WF=np.where(beyond, p_WF, targets.p_WF))

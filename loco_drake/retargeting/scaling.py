@@ -6,17 +6,17 @@ with w and h the withers and the hip, heights over the ground, R(psi, theta) = R
 Ry(theta):
 
     alpha    = stand_height of the robot / stance height H of the animal
-    psi      = atan2(w_y - h_y, w_x - h_x)                           heading
-    theta    = -atan2(w_z - h_z, hypot(w_x - h_x, w_y - h_y))        pitch, nose down > 0
-    p_WB     = alpha (w + h) / 2 + (0, 0, base_height_offset)        roll is 0
-    p_WA     = w + front_hip H d  or  h + rear_hip H d               animal's virtual hip
-    p_WV     = p_WB + R (p_BHip + (0, abduction offset +- lateral_offset, 0))  robot's
-    p_WF_xy  = (p_WV + (alpha |p_WT - p_WA|) u)_xy                   T the animal's toe
-    p_WF_z   = foot_radius + swing_height alpha max(T_z, 0)          toe height kept
+    psi      = atan2(w_y - h_y, w_x - h_x)                      heading
+    theta    = -atan2(w_z - h_z, hypot(w_x - h_x, w_y - h_y))   pitch, nose down > 0
+    p_WB     = alpha (w + h) / 2 + (0, 0, base_height_offset)   roll is 0
+    p_WA     = w + front_hip H d   or   h + rear_hip H d        the animal's virtual hip
+    p_WV     = p_WB + R (p_BHip + (0, abduction offset +- lateral_offset, 0))
+    p_WF_xy  = (p_WV + alpha |p_WT - p_WA| u)_xy                T the animal's toe
+    p_WF_z   = foot_radius + swing_height alpha max(T_z, 0)     the toe's height is kept
 
-where d is the unit vector from hip to withers and u the one from A to the toe. The
-robot's virtual hip is its thigh joint at zero abduction, so that an animal whose toes
-fall under its midline stands with the robot's legs straight down.
+where d is the unit vector from hip to withers and u the one from A to T. The robot's
+virtual hip V is its thigh joint at zero abduction, so that an animal whose toes fall
+under its midline stands with the robot's legs straight down.
 """
 
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ from loco_drake.errors import InputError
 from loco_drake.keypoints import KeypointClip
 from loco_drake.models.robots import Robot
 from loco_drake.retargeting.config import RetargetConfig
-from loco_drake.rotations import quat_multiply, quat_rotate, yaw_quat
+from loco_drake.rotations import quat_conjugate, quat_multiply, quat_rotate, yaw_quat
 
 Array = NDArray[np.float64]
 
@@ -58,6 +58,12 @@ class Targets:
         pitch = np.stack((np.cos(half), zero, np.sin(half), zero), axis=-1)
         return quat_multiply(yaw_quat(self.yaw), pitch)
 
+    @property
+    def p_BF(self) -> Array:
+        """Centres of the toe spheres in the trunk frame, m, shape (T, 4, 3)."""
+        q_BW = quat_conjugate(self.q_WB)[:, None]
+        return quat_rotate(q_BW, self.p_WF - self.p_WB[:, None])
+
 
 def stance_height(clip: KeypointClip, percentile: float) -> float:
     """Returns the animal's stance height in m: of the middle of withers and hip.
@@ -85,7 +91,7 @@ def resample(clip: KeypointClip, fps: float) -> KeypointClip:
         raise InputError(f"A clip needs at least 4 frames, not {len(clip)}.")
     duration = (len(clip) - 1) / clip.fps
     old = np.arange(len(clip)) / clip.fps
-    # Half a microsecond's grace: a duration that is a multiple of the step keeps its end.
+    # A hair's grace, so that a duration of whole steps keeps its last frame.
     new = np.arange(int(duration * fps + 1e-6) + 1) / fps
     withers, hip, toes = (
         CubicSpline(old, points)(new) for points in (clip.withers, clip.hip, clip.toes)

@@ -1,0 +1,121 @@
+"""The commands ``data list`` and ``data inspect``."""
+
+from collections import Counter
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+from loco_drake.cli.output import print_table, write_json
+from loco_drake.datasets.registry import DATASETS, data_dir, read_clip
+from loco_drake.datasets.segments import read_segments
+from loco_drake.files import atomic_path
+from loco_drake.retargeting.inspection import ClipSummary, clip_figure, summarize
+
+
+@dataclass(kw_only=True)
+class DataList:
+    """Lists the sources of motion: how much of each there is, and its licence."""
+
+    data_dir: Path | None = None
+    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
+    json: Path | None = None
+    """Writes the figures of each source to this file."""
+    seed: int = 0
+    """As in every command; nothing here is random."""
+
+    def run(self) -> int:
+        """Prints the table; returns 0.
+
+        Raises:
+            InputError: if there is no data folder, or its segments.csv is damaged.
+        """
+        segments = read_segments(data_dir(self.data_dir))
+        figures: dict[str, dict[str, Any]] = {}
+        for source, dataset in DATASETS.items():
+            stretches = [segment for segment in segments if segment.source == source]
+            figures[source] = {
+                "clips": len(stretches),
+                "frames": sum(segment.end - segment.start for segment in stretches),
+                "seconds": sum(segment.seconds for segment in stretches),
+                "rates_hz": sorted({segment.fps for segment in stretches}),
+                "gaits": dict(Counter(segment.gait for segment in stretches)),
+                "licence": dataset.licence,
+                "attribution": dataset.attribution,
+            }
+        write_json(self.json, figures)
+        rows = [
+            [
+                source,
+                str(row["clips"]),
+                str(row["frames"]),
+                f"{row['seconds']:.1f}",
+                ", ".join(f"{rate:g}" for rate in row["rates_hz"]),
+                ", ".join(f"{n} {gait}" for gait, n in row["gaits"].items()),
+                f"{row['licence']}, {row['attribution']}",
+            ]
+            for source, row in figures.items()
+        ]
+        columns = ["source", "clips", "frames", "seconds", "Hz", "gaits", "licence"]
+        print_table("Sources of motion", columns, rows)
+        return 0
+
+
+@dataclass(kw_only=True)
+class DataInspect:
+    """Draws one stretch of a recording: toe heights, contacts, speeds."""
+
+    file: tyro.conf.Positional[Path]
+    """A recording."""
+    source: str = "dog"
+    """Whose format it has: dog."""
+    start: int = 0
+    """First frame, from 0, at the file's own rate."""
+    end: int | None = None
+    """Frame after the last. Default: the end of the file."""
+    out: Path | None = None
+    """The picture, .png. Default: the recording's name in this folder."""
+    json: Path | None = None
+    """Writes the figures to this file."""
+    seed: int = 0
+    """As in every command; nothing here is random."""
+
+    def run(self) -> int:
+        """Writes the picture and prints the table; returns 0.
+
+        Raises:
+            InputError: if the file is not of the source's format.
+        """
+        clip = read_clip(
+            self.source, self.file, gait="unknown", start=self.start, end=self.end
+        )
+        summary, contacts = summarize(clip)
+        stretch = f"{self.file.stem}-{clip.provenance['frames']}"
+        out = self.out or Path(f"{stretch}.png")
+        with atomic_path(out) as temporary:
+            clip_figure(clip, contacts, stretch).savefig(temporary, dpi=100)
+        write_json(
+            self.json, {**asdict(summary), "licence": clip.provenance["licence"]}
+        )
+        print_table(f"{stretch}, drawn in {out}", ["", "value"], _rows(summary))
+        return 0
+
+
+def _rows(summary: ClipSummary) -> list[list[str]]:
+    def text(value: float | None) -> str:
+        return "-" if value is None else f"{value:.3g}"
+
+    rows = [["frames", str(summary.frames)]]
+    names = {
+        "fps": "frames/s",
+        "seconds": "seconds",
+        "stance_height_m": "stance height, m",
+        "speed_mean_mps": "mean speed, m/s",
+        "stride_period_s": "stride period, s",
+    }
+    rows += [[name, text(getattr(summary, key))] for key, name in names.items()]
+    for key, name in (("duty_factor", "duty factor"), ("phase", "touchdown after RL")):
+        values = "  ".join(text(value) for value in getattr(summary, key))
+        rows.append([f"{name}: FL FR RL RR", values])
+    return rows

@@ -1,0 +1,126 @@
+"""The command ``retarget``."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import tyro
+from rich.console import Console
+from rich.progress import Progress
+
+from loco_drake.cli.output import print_table, write_json
+from loco_drake.datasets.registry import data_dir, read_clip
+from loco_drake.datasets.segments import Segment, read_segments, select_segments
+from loco_drake.errors import InputError
+from loco_drake.gaits import LABELS
+from loco_drake.models.robots import get_robot
+from loco_drake.retargeting.batch import Outcome, retarget_segments
+
+
+@dataclass(kw_only=True)
+class Retarget:
+    """Turns recordings into Motion files of a robot, at 50 frames/s.
+
+    With FILE: one stretch of that recording. Without: every stretch in segments.csv of
+    the data folder that holds one of the fifteen gaits, or those asked for by --source
+    and --gait.
+    """
+
+    file: tyro.conf.Positional[Path | None] = None
+    """A recording; needs --source and --gait."""
+    source: str | None = None
+    """Where the recordings come from: dog. Default: all."""
+    gait: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    """Gait, such as trot; may be given several times. Default: those of the fifteen."""
+    robot: str = "go2"
+    """The robot: go2 or a1."""
+    start: int = 0
+    """First frame of FILE, from 0, at its own rate."""
+    end: int | None = None
+    """Frame of FILE after the last. Default: the end of the file."""
+    out: Path | None = None
+    """Folder for the Motion files. Default: motions/ROBOT."""
+    data_dir: Path | None = None
+    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
+    json: Path | None = None
+    """Writes the figures of each clip to this file."""
+    seed: int = 0
+    """As in every command; nothing here is random."""
+
+    def run(self) -> int:
+        """Writes the files and prints the table; returns 1 if a clip failed, else 0.
+
+        Raises:
+            InputError: if an option is wrong, or FILE cannot be retargeted.
+        """
+        robot = get_robot(self.robot)
+        segments = self._segments()
+        out = self.out or Path("motions") / self.robot
+        outcomes: list[Outcome] = []
+        with Progress(console=Console(stderr=True), transient=True) as progress:
+            task = progress.add_task("Retargeting", total=len(segments))
+            for outcome in retarget_segments(segments, robot, out):
+                outcomes.append(outcome)
+                progress.advance(task)
+        failed = [outcome for outcome in outcomes if outcome.error is not None]
+        if self.file is not None and failed:
+            raise InputError(str(failed[0].error))
+        write_json(self.json, {o.segment.name: _figures(o) for o in outcomes})
+        rows = [_row(outcome) for outcome in outcomes if outcome.report is not None]
+        print_table(f"{len(rows)} motions in {out}", list(_COLUMNS), rows)
+        console = Console(stderr=True, highlight=False, soft_wrap=True)
+        for outcome in failed:
+            console.print(
+                f"Failed: {outcome.segment.name}: {outcome.error}", markup=False
+            )
+        return 1 if failed else 0
+
+    def _segments(self) -> list[Segment]:
+        if self.file is not None:
+            return [self._segment_of_file(self.file)]
+        if self.start != 0 or self.end is not None:
+            raise InputError("--start and --end need a FILE.")
+        segments = read_segments(data_dir(self.data_dir))
+        if self.gait:
+            return select_segments(segments, self.source, self.gait)
+        known = {(label.source, label.gait) for label in LABELS}
+        found = select_segments(segments, self.source, ())
+        return [s for s in found if (s.source, s.gait) in known]
+
+    def _segment_of_file(self, file: Path) -> Segment:
+        if self.source is None or len(self.gait) != 1:
+            raise InputError("A FILE needs its --source and one --gait.")
+        (gait,) = self.gait
+        clip = read_clip(self.source, file, gait=gait, start=self.start, end=self.end)
+        end = self.start + len(clip)
+        return Segment(self.source, file, gait, self.start, end, clip.fps)
+
+
+def _figures(outcome: Outcome) -> dict[str, object]:
+    if outcome.report is None:
+        return {"error": outcome.error}
+    return {**asdict(outcome.report), "path": str(outcome.path)}
+
+
+_COLUMNS = {
+    "clip": "",
+    "frames": "frames",
+    "frames/s": "frames_per_second",
+    "slip mm/s": "stance_slip_median_mps",
+    "sunk mm": "penetration_max_m",
+    "limits": "joint_limit_violations",
+    "speed ratio": "joint_speed_ratio_max",
+    "toe error mm": "toe_error_rmse_m",
+    "correction mm": "correction_rmse_m",
+}
+
+
+def _row(outcome: Outcome) -> list[str]:
+    figures = _figures(outcome)
+    row = [outcome.segment.name]
+    for column, key in list(_COLUMNS.items())[1:]:
+        value = figures[key]
+        if isinstance(value, float):
+            value = value * 1000 if " mm" in column else value
+            value = f"{value:.0f}" if column == "frames/s" else f"{value:.2f}"
+        row.append("-" if value is None else str(value))
+    return row
