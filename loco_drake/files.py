@@ -39,4 +39,6 @@ def atomic_path(path: Path) -> Iterator[Path]:
 def cache_dir() -> Path:
     """Returns the user's cache folder, or ``LOCO_DRAKE_CACHE`` where that is set."""
     override = os.environ.get("LOCO_DRAKE_CACHE")
-    return Path(override) if override else Path(platformdirs.user_cache_dir("loco_drake"))
+    return (
+        Path(override) if override else Path(platformdirs.user_cache_dir("loco_drake"))
+    )

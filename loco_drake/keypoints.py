@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.errors import InputError
+from loco_drake.errors import InputError, check_choice
 from loco_drake.gaits import SOURCES
-from loco_drake.errors import check_choice
 
 # Feet in the order of every array with a leg axis; left is +y.
 LEGS = ("FL", "FR", "RL", "RR")

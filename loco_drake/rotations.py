@@ -18,7 +18,9 @@ def quat_multiply(a: Array, b: Array) -> Array:
     if a.ndim == 1:
         w, x, y, z = a.tolist()
         # The transpose of the matrix that multiplies by a from the left.
-        return b @ np.array([[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]])
+        return b @ np.array(
+            [[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]]
+        )
     aw, ax, ay, az = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
     bw, bx, by, bz = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
     return np.stack(
@@ -92,7 +94,9 @@ def quat_exp(rotation: Array) -> Array:
     """Returns unit quaternions (..., 4) of rotation vectors (..., 3)."""
     half = 0.5 * np.sqrt((rotation * rotation).sum(axis=-1, keepdims=True))
     # sin(h) / h by numpy's normalised sinc, which is exact at zero.
-    return np.concatenate((np.cos(half), 0.5 * np.sinc(half / np.pi) * rotation), axis=-1)
+    return np.concatenate(
+        (np.cos(half), 0.5 * np.sinc(half / np.pi) * rotation), axis=-1
+    )
 
 
 def quat_error(q_WA: Array, q_WB: Array) -> Array:

@@ -44,7 +44,9 @@ def save_weights(
         save_file(stored, temporary, metadata={"loco_drake": json.dumps(header)})
 
 
-def load_weights(path: Path, kind: str) -> tuple[dict[str, torch.Tensor], dict[str, Any]]:
+def load_weights(
+    path: Path, kind: str
+) -> tuple[dict[str, torch.Tensor], dict[str, Any]]:
     """Returns the tensors and the config of a weights file.
 
     What is stored in 16 bits is returned in 32, all else as it is.
@@ -70,14 +72,18 @@ def load_weights(path: Path, kind: str) -> tuple[dict[str, torch.Tensor], dict[s
             f"{path} has weights format {version}; this version reads {FORMAT_VERSION}."
         )
     if found != kind:
-        raise InputError(f"{path} holds {found} weights, but {kind} weights are needed.")
+        raise InputError(
+            f"{path} holds {found} weights, but {kind} weights are needed."
+        )
     return {
         name: value.float() if value.dtype == torch.float16 else value
         for name, value in tensors.items()
     }, config
 
 
-def load_into(module: torch.nn.Module, tensors: dict[str, torch.Tensor], path: Path) -> None:
+def load_into(
+    module: torch.nn.Module, tensors: dict[str, torch.Tensor], path: Path
+) -> None:
     """Copies ``tensors`` into ``module``.
 
     Raises:

@@ -99,7 +99,9 @@ def load_actor(path: Path, robot: Robot) -> Actor:
     for name, value in asdict(expected).items():
         if getattr(config, name) != value:
             what = name.replace("_", " ")
-            detail = f": {getattr(config, name)}, not {value}" if name == "robot" else ""
+            detail = (
+                f": {getattr(config, name)}, not {value}" if name == "robot" else ""
+            )
             raise InputError(f"The policy in {path} is for another {what}{detail}.")
     actor = Actor(config)
     load_into(actor, tensors, path)

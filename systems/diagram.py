@@ -1,7 +1,6 @@
 """The diagram of a robot that does what a plan says."""
 
-from pydrake.geometry import Meshcat
-from pydrake.geometry import MeshcatVisualizer, MeshcatVisualizerParams
+from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import (
     Context,
@@ -10,7 +9,6 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
-from loco_drake.errors import InputError
 from loco_drake.models.plant import AddRobotPlant
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.motion import load_motion
@@ -101,9 +99,7 @@ def MakeLocomotionDiagram(
     observation = builder.AddNamedSystem("observation", Observation(robot))
     builder.Connect(plan, observation.GetInputPort("plan"))
     builder.Connect(state, observation.GetInputPort("state"))
-    builder.Connect(
-        targets.GetOutputPort("action"), observation.GetInputPort("action")
-    )
+    builder.Connect(targets.GetOutputPort("action"), observation.GetInputPort("action"))
     if isinstance(scenario.policy, ExternalAction):
         builder.ExportInput(targets.GetInputPort("action"), "action")
     else:
@@ -158,22 +154,29 @@ def _AddReference(
     return builder.AddNamedSystem("reference", PlanPlayer(robot, plan))
 
 
-def StartOnPlan(simulator: Simulator) -> None:
+def StartOnPlan(simulator: Simulator, diagram: Diagram | None = None) -> None:
     """Initializes the simulator with the robot in the first state of its plan.
 
     The plan of a generator or smoother exists only after initialization, and a robot
     that starts elsewhere would begin with a jump.
+
+    Args:
+        simulator: of a locomotion diagram, or of a diagram that holds one.
+        diagram: the locomotion diagram; by default the simulator's system.
     """
+    diagram = diagram or simulator.get_system()
     simulator.Initialize()
-    context = simulator.get_mutable_context()
-    diagram = simulator.get_system()
-    PlaceOnPlan(diagram, context)
+    PlaceOnPlan(
+        diagram, diagram.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    )
     # Publishes (logs, Meshcat) must see the robot where it starts.
     simulator.Initialize()
 
 
 def PlaceOnPlan(diagram: Diagram, context: Context) -> None:
-    """Sets the robot's state to that of the plan at the context's time."""
+    """Sets the robot's state to that of the plan; ``context`` is the diagram's."""
     state = diagram.GetOutputPort("plan_state").Eval(context)
     plant = diagram.GetSubsystemByName("plant")
-    plant.SetPositionsAndVelocities(plant.GetMyMutableContextFromRoot(context), state)
+    plant.SetPositionsAndVelocities(
+        diagram.GetMutableSubsystemContext(plant, context), state
+    )

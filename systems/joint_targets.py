@@ -65,9 +65,7 @@ class JointTargets(LeafSystem):
         action = self._action.Eval(context)
         k = plan.index(context.get_time() + PLAN_DT)
         targets = (
-            plan.q[k, 7:]
-            + ACTION_SCALE * action
-            + self._velocity_gain * plan.v[k, 6:]
+            plan.q[k, 7:] + ACTION_SCALE * action + self._velocity_gain * plan.v[k, 6:]
         )
         held = state.get_mutable_discrete_state(int(self._held))
         held.set_value(np.concatenate((action, targets)))

@@ -97,9 +97,7 @@ def LoadScenario(
                 defaults=scenario,
             )
         if overlay is not None:
-            scenario = yaml_load_typed(
-                schema=Scenario, data=overlay, defaults=scenario
-            )
+            scenario = yaml_load_typed(schema=Scenario, data=overlay, defaults=scenario)
     except InputError:
         raise
     except Exception as error:

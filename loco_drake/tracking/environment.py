@@ -89,9 +89,7 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
         self._diagram = _diagram(
             self.config.robot, plant.contact, plant.time_step, plant.friction
         )
-        self._simulator = Simulator(
-            self._diagram, self._diagram.CreateDefaultContext()
-        )
+        self._simulator = Simulator(self._diagram, self._diagram.CreateDefaultContext())
         ConfigureSimulator(self._simulator, plant)
         self._context = self._simulator.get_mutable_context()
         self._plant = self._diagram.GetSubsystemByName("plant")

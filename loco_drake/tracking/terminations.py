@@ -44,6 +44,4 @@ def is_lost(
         return True
     gap = state[4:7] - plan_state[4:7]
     turn = quat_error(state[:4], plan_state[:4])
-    return bool(
-        gap @ gap > config.position**2 or turn @ turn > config.rotation**2
-    )
+    return bool(gap @ gap > config.position**2 or turn @ turn > config.rotation**2)

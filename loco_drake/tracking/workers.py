@@ -130,9 +130,7 @@ class WorkerVecEnv(VecEnv):  # type: ignore[misc]
             info = infos[i]
             # Steps lost to a fall count as zero; those cut off by the plan's end do not.
             steps = (
-                self._lengths[i]
-                if info["TimeLimit.truncated"]
-                else self._episode_steps
+                self._lengths[i] if info["TimeLimit.truncated"] else self._episode_steps
             )
             self._sampler.record(info["plan"], self._returns[i] / steps)
             info["episode"] = {
@@ -198,7 +196,9 @@ class WorkerVecEnv(VecEnv):  # type: ignore[misc]
         raise NotImplementedError("environments live in worker processes")
 
     def env_is_wrapped(
-        self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: Any = None
+        self,
+        wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]],
+        indices: Any = None,
     ) -> list[bool]:
         """Returns False for each environment: none is wrapped."""
         return [False] * len(self._indices(indices))

@@ -1,0 +1,85 @@
+"""The entry point of ``loco-drake``."""
+
+import logging
+import sys
+from importlib import import_module
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from loco_drake import __version__
+from loco_drake.errors import InputError, check_choice
+
+# Command: module, class, what it does. A module is imported only when its command is
+# asked for: --help should not wait for torch and Drake.
+_COMMANDS = {
+    "simulate": ("simulate", "Simulate", "a robot does a gait, in physics"),
+    "generate": ("generate", "Generate", "write Motion files for a gait"),
+    "retarget": ("retarget", "Retarget", "recordings to Motion files of a robot"),
+    "data list": ("data", "DataList", "the sources of motion and their licences"),
+    "data inspect": ("data", "DataInspect", "one stretch of a recording as a picture"),
+    "train tokenizer": ("train_tokenizer", "TrainTokenizer", "motion to tokens"),
+    "train generator": (
+        "train_generator",
+        "TrainGenerator",
+        "the GPT that writes them",
+    ),
+    "train tracker": ("train_tracker", "TrainTracker", "the policy, by PPO"),
+}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs a command; returns its exit status.
+
+    0 means done (a fall is a result), 1 that the work failed or was interrupted, 2
+    that the input was wrong, which one sentence on stderr explains.
+
+    Args:
+        arguments: instead of those of the process.
+    """
+    arguments = sys.argv[1:] if arguments is None else arguments
+    # Drake reports harmless properties of models at this level.
+    logging.getLogger("drake").setLevel(logging.ERROR)
+    try:
+        if not arguments or arguments[0] in ("-h", "--help"):
+            _print_help()
+            return 0
+        if arguments[0] == "--version":
+            print(__version__)
+            return 0
+        name, rest = _split(arguments)
+        module, class_name, _ = _COMMANDS[name]
+        command = getattr(import_module(f"loco_drake.cli.{module}"), class_name)
+        status: int = tyro.cli(command, prog=f"loco-drake {name}", args=rest).run()
+        return status
+    except InputError as error:
+        print(f"loco-drake: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("loco-drake: interrupted", file=sys.stderr)
+        return 1
+
+
+def _split(arguments: list[str]) -> tuple[str, list[str]]:
+    """Returns the command's name and its own arguments."""
+    groups = {name.split()[0] for name in _COMMANDS if " " in name}
+    words = 1
+    if arguments[0] in groups:
+        words = 2
+        members = [n for n in _COMMANDS if n.startswith(f"{arguments[0]} ")]
+        if arguments[1:2] in ([], ["-h"], ["--help"]):
+            raise InputError(f"Say which: {', '.join(members)}.")
+    name = " ".join(arguments[:words])
+    check_choice("command", name, _COMMANDS)
+    return name, arguments[words:]
+
+
+def _print_help() -> None:
+    console = Console()
+    console.print("loco-drake: quadruped motion, learned and simulated in Drake\n")
+    table = Table(box=None, show_header=False, padding=(0, 2))
+    for name, (_, _, text) in _COMMANDS.items():
+        table.add_row(f"loco-drake {name}", text)
+    console.print(table)
+    console.print("\nEach command explains its options with --help.")

@@ -1,0 +1,93 @@
+"""``loco-drake train tracker``: the policy that follows plans."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import torch
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeRemainingColumn,
+)
+
+from loco_drake.cli.output import print_table, write_json
+from loco_drake.cli.training import print_stopped
+from loco_drake.errors import InputError
+from loco_drake.models.plant import PlantConfig
+from loco_drake.models.robots import get_robot
+from loco_drake.tracking.environment import EnvironmentConfig
+from loco_drake.tracking.references import load_references
+from loco_drake.tracking.train import Progress as TrainingProgress
+from loco_drake.tracking.train import TrainingConfig, train_tracker
+
+
+@dataclass(kw_only=True)
+class TrainTracker:
+    """Train the tracking policy on a folder of Motion files, by PPO.
+
+    Ctrl-C stops it after saving; --resume goes on from there.
+    """
+
+    references: Path
+    """Folder of Motion files to follow, such as loco-drake generate writes."""
+    out: Path = Path("runs/tracker")
+    """Folder of checkpoint, policy and TensorBoard logs."""
+    robot: str = "go2"
+    """Robot: go2 or a1."""
+    steps: int = 2_000_000
+    """Environment steps in all, of 20 ms each."""
+    workers: int = 2
+    """Processes that simulate."""
+    per_worker: int = 8
+    """Environments in each process."""
+    plant: PlantConfig = field(default_factory=PlantConfig)
+    """Contact solver, time step and friction."""
+    seed: int = 0
+    """Of everything random."""
+    resume: bool = False
+    """Go on from the checkpoint in the folder."""
+    json: Path | None = None
+    """Write the figures to a file."""
+
+    def run(self) -> int:
+        """Trains, prints and writes; returns the exit status."""
+        robot = get_robot(self.robot)
+        for name in ("steps", "workers", "per_worker"):
+            if getattr(self, name) < 1:
+                raise InputError(f"{name} must be at least 1.")
+        self.plant.check()
+        plans = load_references(robot, self.references)
+        config = TrainingConfig(
+            steps=self.steps,
+            workers=self.workers,
+            per_worker=self.per_worker,
+            seed=self.seed,
+            environment=EnvironmentConfig(robot=self.robot, plant=self.plant),
+        )
+        torch.set_num_threads(max(1, self.workers))
+        bar = Progress(
+            TextColumn("steps"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+            TextColumn("return {task.fields[score]:.1f} of 100"),
+        )
+        with bar:
+            task = bar.add_task("steps", total=self.steps, score=0.0)
+
+            def report(progress: TrainingProgress) -> None:
+                score = float(np.mean(list(progress.scores.values())))
+                bar.update(task, completed=progress.steps, score=score)
+
+            figures = train_tracker(
+                plans, config, self.out, resume=self.resume, report=report
+            )
+        write_json(self.json, figures)
+        rows = [(label, f"{score:.1f}") for label, score in figures["scores"].items()]
+        print_table("Recent training returns, of 100", ("gait", "return"), rows)
+        if figures["interrupted"]:
+            return print_stopped(figures["steps"], self.steps)
+        return 0

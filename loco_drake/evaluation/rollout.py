@@ -1,0 +1,120 @@
+"""Simulations whose outcome is kept."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.geometry import Meshcat
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import (
+    Context,
+    Diagram,
+    DiagramBuilder,
+    EventStatus,
+)
+from pydrake.systems.primitives import LogVectorOutput
+
+from loco_drake.evaluation.tracking import Rollout
+from loco_drake.models.plant import ConfigureSimulator
+from loco_drake.models.robots import get_robot
+from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
+from loco_drake.systems.fall import has_fallen
+from loco_drake.systems.plan import PLAN_DT
+from loco_drake.systems.scenario import Scenario
+
+_LOGGED = ("state", "plan_state", "path_time", "reward_terms")
+
+
+class Recorder:
+    """The locomotion diagram with logs, to be simulated any number of times.
+
+    Args:
+        scenario: what to simulate.
+        meshcat: where to draw it, if anywhere.
+
+    Attributes:
+        diagram: the locomotion diagram and its logs.
+        locomotion: the locomotion diagram itself.
+        simulator: of ``diagram``.
+    """
+
+    def __init__(self, scenario: Scenario, meshcat: Meshcat | None = None) -> None:
+        self._robot = get_robot(scenario.robot)
+        builder = DiagramBuilder()
+        self.locomotion = builder.AddSystem(
+            MakeLocomotionDiagram(scenario, meshcat=meshcat)
+        )
+        self._logs = {
+            name: LogVectorOutput(self.locomotion.GetOutputPort(name), builder, PLAN_DT)
+            for name in _LOGGED
+        }
+        self.diagram: Diagram = builder.Build()
+        self.simulator = Simulator(self.diagram)
+        ConfigureSimulator(self.simulator, scenario.plant)
+        self._plant = self.locomotion.GetSubsystemByName("plant")
+        self._fell = False
+
+    @property
+    def context(self) -> Context:
+        """The root context."""
+        return self.simulator.get_mutable_context()
+
+    def subsystem_context(self, name: str) -> Context:
+        """Returns the context of the locomotion diagram's subsystem ``name``."""
+        system = self.locomotion.GetSubsystemByName(name)
+        return system.GetMyMutableContextFromRoot(self.context)
+
+    def start(self) -> None:
+        """Puts the clock to 0, the robot on its plan and empties the logs."""
+        self._fell = False
+        self.simulator.clear_monitor()
+        self.context.SetTime(0.0)
+        StartOnPlan(self.simulator, self.locomotion)
+        for log in self._logs.values():
+            log.FindMutableLog(self.context).Clear()
+        # Initialize published the first sample; it is wanted in the cleared logs too.
+        self.simulator.Initialize()
+        self.simulator.set_monitor(self._monitor)
+
+    def run(
+        self, duration: float, after_step: Callable[[float], None] | None = None
+    ) -> tuple[Rollout, float]:
+        """Simulates until ``duration`` or a fall; call :meth:`start` first.
+
+        Args:
+            duration: context time in s to stop at.
+            after_step: called after each control period, with the context's time.
+
+        Returns:
+            What happened, and the seconds spent inside AdvanceTo.
+        """
+        steps = round(duration / PLAN_DT)
+        wall = 0.0
+        for step in range(1, steps + 1):
+            start = time.perf_counter()
+            self.simulator.AdvanceTo(step * PLAN_DT)
+            wall += time.perf_counter() - start
+            if self._fell:
+                break
+            if after_step is not None:
+                after_step(step * PLAN_DT)
+        data = {
+            name: log.FindLog(self.context).data().T.copy()
+            for name, log in self._logs.items()
+        }
+        rollout = Rollout(
+            state=data["state"],
+            plan_state=data["plan_state"],
+            path_time=data["path_time"][:, 0],
+            reward=data["reward_terms"].sum(axis=1),
+            steps=steps,
+            fell=self._fell,
+        )
+        return rollout, wall
+
+    def _monitor(self, root: Context) -> EventStatus:
+        context = self._plant.GetMyContextFromRoot(root)
+        if has_fallen(self._robot, np.asarray(self._plant.GetPositions(context))):
+            self._fell = True
+            return EventStatus.ReachedTermination(self._plant, "the robot fell")
+        return EventStatus.DidNothing()

@@ -1,0 +1,115 @@
+"""How well a robot followed its plan: one definition for each number.
+
+All are computed from what was simulated: states and plan states sampled every PLAN_DT,
+the first at time 0, and the reward's terms. Where a robot falls the samples end.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.rotations import (
+    quat_error,
+    quat_multiply,
+    quat_rotate,
+    yaw_of,
+    yaw_quat,
+)
+from loco_drake.systems.plan import PLAN_DT
+
+Array = NDArray[np.float64]
+
+# Base errors are re-aligned with the plan this often: they then tell how well the robot
+# moves, not how far a small error of heading carries it off in the end.
+WINDOW = 2.0  # s
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """What a simulation left.
+
+    Attributes:
+        state: the plant's [q, v] at each sample, shape (N + 1, 37).
+        plan_state: the same of the plan.
+        path_time: seconds of unsmoothed motion that have passed, shape (N + 1,).
+        reward: of each sample, shape (N + 1,); that of the first is not counted.
+        steps: how many steps were to be made; more than N if the robot fell.
+        fell: whether it did.
+    """
+
+    state: Array
+    plan_state: Array
+    path_time: Array
+    reward: Array
+    steps: int
+    fell: bool
+
+
+def tracking_metrics(rollout: Rollout) -> dict[str, float]:
+    """Returns all figures of a rollout, by name."""
+    position, orientation = base_errors(rollout)
+    return {
+        "normalized_return": normalized_return(rollout),
+        "joint_rmse_rad": joint_rmse(rollout),
+        "base_position_rmse_m": position,
+        "base_orientation_rmse_rad": orientation,
+        "stretch": stretch(rollout),
+        "speed_mps": speed(rollout),
+    }
+
+
+def normalized_return(rollout: Rollout) -> float:
+    """Reward summed over all steps that were to be made, over its maximum, times 100.
+
+    The maximum is 1 a step. Steps lost to a fall count, with a reward of 0.
+    """
+    return 100 * float(rollout.reward[1:].sum()) / rollout.steps
+
+
+def joint_rmse(rollout: Rollout) -> float:
+    """Root mean square over samples and joints of the angle from the plan, rad."""
+    error = (rollout.state - rollout.plan_state)[:, 7:19]
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def base_errors(rollout: Rollout) -> tuple[float, float]:
+    """Root mean squares of the base's distance (m) and angle (rad) from the plan.
+
+    At the start of each 2 s window the plan is moved in x and y and turned about z so
+    that its base is where the robot's is; height, roll and pitch are never aligned.
+    The distance is Euclidean, the angle that of the rotation between the two; the mean
+    is over all samples.
+    """
+    samples = round(WINDOW / PLAN_DT)
+    squares = []
+    for first in range(0, len(rollout.state), samples):
+        own = rollout.state[first : first + samples]
+        plan = rollout.plan_state[first : first + samples]
+        turn = yaw_quat(yaw_of(own[0, :4]) - yaw_of(plan[0, :4]))
+        p_plan = quat_rotate(turn, plan[:, 4:7] - plan[0, 4:7])
+        p_plan[:, 2] = plan[:, 6]
+        p_own = own[:, 4:7] - own[0, 4:7]
+        p_own[:, 2] = own[:, 6]
+        rotation = quat_error(own[:, :4], quat_multiply(turn[None], plan[:, :4]))
+        squares.append(
+            np.stack(
+                (((p_own - p_plan) ** 2).sum(axis=1), (rotation**2).sum(axis=1)), axis=1
+            )
+        )
+    means = np.concatenate(squares).mean(axis=0)
+    return float(np.sqrt(means[0])), float(np.sqrt(means[1]))
+
+
+def stretch(rollout: Rollout) -> float:
+    """Duration of the plan as it was played over its duration as it was written."""
+    played = (len(rollout.path_time) - 1) * PLAN_DT
+    written = float(rollout.path_time[-1] - rollout.path_time[0])
+    return played / written if written > 0 else 1.0
+
+
+def speed(rollout: Rollout) -> float:
+    """Mean over samples of the base's velocity along its own heading, m/s."""
+    yaw = yaw_of(rollout.state[:, :4])
+    v = rollout.state[:, 22:25]
+    return float(np.mean(v[:, 0] * np.cos(yaw) + v[:, 1] * np.sin(yaw)))

@@ -1,0 +1,184 @@
+"""The system that writes motion for a gait, as long as the simulation runs."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import (
+    AbstractStateIndex,
+    Context,
+    EventStatus,
+    LeafSystem,
+    State,
+)
+
+from loco_drake.errors import InputError
+from loco_drake.gaits import parse_label
+from loco_drake.generation.motion_model import MotionModel, Stream
+from loco_drake.generation.pretrained import pretrained_motion_model
+from loco_drake.models.robots import Robot
+
+from .plan import PLAN_DT, Plan, join_plans, make_plan
+from .scenario import GeneratedReference
+
+_PERIOD = 0.1  # seconds between looks at whether more is needed
+_KEEP = 1.0  # seconds of plan kept behind what has been used up
+
+
+@dataclass(frozen=True, eq=False)
+class _Script:
+    """Immutable state: what has been written, and how to go on."""
+
+    label: int
+    stream: Stream
+    plan: Plan | None = None
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "_Script":
+        return self
+
+
+class ReferenceGenerator(LeafSystem):
+    """Writes a plan for a gait with the GPT, chunk by chunk, ahead of its use.
+
+    .. pydrake_system::
+
+        name: ReferenceGenerator
+        input_ports:
+        - gait (optional)
+        - path_time (optional)
+        output_ports:
+        - plan
+
+    ``path_time`` (s) is how much of the plan has been used up: what the smoother has
+    committed; if it is not connected, the context's time. ``gait`` is an index into
+    :data:`loco_drake.gaits.LABELS` that overrides the configured label for the chunks
+    still to be written. What is written depends only on seed, number of the chunk and
+    labels, so that a Context that is cloned or reset repeats it exactly.
+
+    Args:
+        robot: the robot that is to move.
+        config: gait, seed and sampling.
+        model: the motion model; the shipped one if not given.
+        horizon: seconds of plan to have written beyond what is used up.
+
+    Raises:
+        InputError: if the gait is unknown to the model or no gait at all, or a number
+            in ``config`` is not sensible.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        config: GeneratedReference | None = None,
+        model: MotionModel | None = None,
+        horizon: float = 3.0,
+    ) -> None:
+        super().__init__()
+        self._robot = robot
+        self._config = config or GeneratedReference()
+        self._horizon = horizon
+        _check(self._config)
+        self._model = model or pretrained_motion_model(robot.name)
+        self._gait = self.DeclareVectorInputPort("gait", 1)
+        self._path_time = self.DeclareVectorInputPort("path_time", 1)
+        first = self._begun(self._config.gait, self._config.seed)
+        self._script = AbstractStateIndex(self.DeclareAbstractState(Value(first)))
+        self.DeclareAbstractOutputPort(
+            "plan",
+            lambda: Value(first.plan),
+            self._calc_plan,
+            prerequisites_of_calc={self.abstract_state_ticket(self._script)},
+        )
+        self.DeclarePeriodicUnrestrictedUpdateEvent(
+            period_sec=_PERIOD, offset_sec=0.0, update=self._update
+        )
+
+    def SetReference(self, context: Context, *, gait: str, seed: int) -> None:
+        """Begins anew, from time 0, with a gait and a seed.
+
+        Args:
+            context: this system's own.
+            gait: a gait label.
+            seed: what the tokens are drawn with.
+        """
+        _check(replace(self._config, gait=gait, seed=seed))
+        script = self._begun(gait, seed)
+        context.get_mutable_abstract_state(int(self._script)).set_value(script)
+
+    def _begun(self, gait: str, seed: int) -> _Script:
+        """Returns the script as it is at time 0, the first chunks written."""
+        stream = self._model.start(
+            np.array([seed]), duration=float(self._config.duration)
+        )
+        script = _Script(parse_label(gait).index, stream)
+        return self._written(script, script.label, 0.0)
+
+    def _calc_plan(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self._get(context).plan)
+
+    def _get(self, context: Context) -> _Script:
+        script = context.get_abstract_state(int(self._script)).get_value()
+        assert isinstance(script, _Script)
+        return script
+
+    def _update(self, context: Context, state: State) -> EventStatus:
+        old = self._get(context)
+        label = old.label
+        if self._gait.HasValue(context):
+            label = int(self._gait.Eval(context)[0])
+        used = context.get_time()
+        if self._path_time.HasValue(context):
+            used = float(self._path_time.Eval(context)[0])
+        new = self._written(old, label, used)
+        if new is old:
+            return EventStatus.DidNothing()
+        state.get_mutable_abstract_state(int(self._script)).set_value(new)
+        return EventStatus.Succeeded()
+
+    def _written(self, script: _Script, label: int, used: float) -> _Script:
+        """Returns ``script`` with chunks added until the horizon is reached."""
+        while script.plan is None or (script.plan.path_time[-1] < used + self._horizon):
+            stream, frames = self._model.extend(
+                script.stream,
+                np.array([label]),
+                temperature=self._config.temperature,
+                top_p=self._config.top_p,
+            )
+            plan = script.plan
+            count = 0 if plan is None else round(plan.path_time[-1] / PLAN_DT) + 1
+            times = PLAN_DT * np.arange(count, count + frames.q.shape[1])
+            added = make_plan(
+                self._robot,
+                q=frames.q[0],
+                v=frames.v[0],
+                contacts=frames.contacts[0],
+                labels=frames.labels[0],
+                start_time=count * PLAN_DT,
+                path_time=times,
+                open_ended=True,
+            )
+            script = _Script(
+                label, stream, added if plan is None else join_plans(plan, added)
+            )
+        plan = script.plan
+        assert plan is not None
+        old = int(np.searchsorted(plan.path_time, used - _KEEP))
+        if old > self._model.chunk_frames:
+            script = replace(script, plan=plan.tail(old))
+        return script
+
+
+def _check(config: GeneratedReference) -> None:
+    """Raises InputError unless every field is sensible."""
+    parse_label(config.gait)
+    if config.seed < 0:
+        raise InputError(f"The seed must be 0 or more, not {config.seed}.")
+    if not (np.isfinite(config.duration) and config.duration > 0):
+        raise InputError(f"The duration must be above 0 s, not {config.duration}.")
+    if not (np.isfinite(config.temperature) and config.temperature >= 0):
+        raise InputError(
+            f"The temperature must be 0 or more, not {config.temperature}."
+        )
+    if not 0 < config.top_p <= 1:
+        raise InputError(f"top_p must be above 0 and at most 1, not {config.top_p}.")
