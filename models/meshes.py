@@ -85,18 +85,18 @@ def _convert(source: Path, target: Path, grain: float) -> None:
     count = 0
     # In the scene's frame: parts of a Collada file have transforms of their own.
     for index, part in enumerate(scene.dump()):
+        assert isinstance(part, trimesh.Trimesh)
         # Without normals viewers shade each face flat, which suits machined parts and
         # halves the file.
-        mesh = trimesh.Trimesh(part.vertices, part.faces, process=False)
-        mesh.apply_scale(1 / grain)
+        mesh = trimesh.Trimesh(part.vertices / grain, part.faces, process=False)
         mesh.merge_vertices(digits_vertex=0)
         mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
         mesh.remove_unreferenced_vertices()
-        mesh.apply_scale(grain)
         obj.append(f"usemtl m{index}")
-        obj += [f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in mesh.vertices]
+        obj += [f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in mesh.vertices * grain]
         obj += [f"f {a} {b} {c}" for a, b, c in mesh.faces + count + 1]
         count += len(mesh.vertices)
+        assert isinstance(part.visual, trimesh.visual.TextureVisuals)
         r, g, b = _srgb(part.visual.material.main_color)
         mtl.append(f"newmtl m{index}\nKd {r:.3f} {g:.3f} {b:.3f}")
     with atomic_path(target.with_suffix(".mtl")) as temporary:

@@ -3,18 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import (
-    AddContactMaterial,
-    HalfSpace,
-    ProximityProperties,
-    SceneGraph,
-    SceneGraphConfig,
-)
-from pydrake.math import RigidTransform
+from pydrake.geometry import SceneGraph, SceneGraphConfig
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import (
     AddMultibodyPlant,
-    CoulombFriction,
     MultibodyPlant,
     MultibodyPlantConfig,
 )
@@ -24,13 +16,10 @@ from pydrake.systems.framework import DiagramBuilder
 
 from loco_drake.errors import InputError, check_choice
 
+from .ground import AddGround
 from .robots import AddRobotModel, Robot
 
 CONTACTS = ("similar", "lagged", "sap", "cenic")
-
-# So much stiffer than the feet that theirs is the stiffness of the contact:
-# k = k_foot k_ground / (k_foot + k_ground).
-_GROUND_STIFFNESS = 1e9
 
 
 # Not frozen: yaml_load_typed sets the fields one by one.
@@ -48,7 +37,7 @@ class PlantConfig:
     # Coulomb friction of the ground. The feet have .8, and the coefficient of a contact
     # is the harmonic mean of the two.
     friction: float = 0.8
-    # Whether to load meshes, for Meshcat.
+    # Whether to load meshes and a floor, for Meshcat.
     visual: bool = False
 
     def check(self) -> None:
@@ -97,7 +86,7 @@ def AddRobotPlant(
     scene_graph_config.default_proximity_properties.resolution_hint = None
     scene_graph.set_config(scene_graph_config)
     instance = AddRobotModel(Parser(plant), robot.name, visual=config.visual)
-    _add_ground(plant, config)
+    AddGround(plant, friction=config.friction, visual=config.visual)
     plant.Finalize()
     plant.SetDefaultPositions(
         [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, robot.stand_height, *robot.stand_joints]
@@ -119,18 +108,3 @@ def ConfigureSimulator(simulator: Simulator, config: PlantConfig) -> None:
             use_error_control=True,
         )
         ApplySimulatorConfig(simulator_config, simulator)
-
-
-def _add_ground(plant: MultibodyPlant, config: PlantConfig) -> None:
-    properties = ProximityProperties()
-    AddContactMaterial(
-        dissipation=0.0,
-        point_stiffness=_GROUND_STIFFNESS,
-        friction=CoulombFriction(config.friction, config.friction),
-        properties=properties,
-    )
-    properties.AddProperty("material", "relaxation_time", 0.0)
-    # Not drawn: Meshcat has a grid of its own at z = 0.
-    plant.RegisterCollisionGeometry(
-        plant.world_body(), RigidTransform(), HalfSpace(), "ground", properties
-    )

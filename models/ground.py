@@ -1,0 +1,77 @@
+"""Flat ground: a half space to stand on and a chequered floor to look at."""
+
+from pydrake.common import MemoryFile
+from pydrake.geometry import (
+    AddContactMaterial,
+    GeometryInstance,
+    HalfSpace,
+    IllustrationProperties,
+    InMemoryMesh,
+    Mesh,
+    ProximityProperties,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+
+# So much stiffer than the feet that theirs is the stiffness of the contact:
+# k = k_foot k_ground / (k_foot + k_ground).
+_STIFFNESS = 1e9
+
+_TILE = 0.5  # m; shows at a glance how far and how fast a robot goes
+_TILES = 60  # along each side
+_MATERIALS = """
+newmtl light
+Kd .62 .64 .67
+newmtl dark
+Kd .53 .55 .58
+"""
+
+
+def AddGround(plant: MultibodyPlant, *, friction: float, visual: bool) -> None:
+    """Adds ground at z = 0 to a plant that is not finalized.
+
+    Args:
+        plant: registered with a scene graph.
+        friction: Coulomb coefficient, static and dynamic.
+        visual: whether to draw a floor as well.
+    """
+    properties = ProximityProperties()
+    AddContactMaterial(
+        dissipation=0.0,
+        point_stiffness=_STIFFNESS,
+        friction=CoulombFriction(friction, friction),
+        properties=properties,
+    )
+    # As AddContactMaterial does for "lagged" and "similar", leave damping to the feet.
+    properties.AddProperty("material", "relaxation_time", 0.0)
+    world = plant.world_body()
+    plant.RegisterCollisionGeometry(
+        world, RigidTransform(), HalfSpace(), "ground", properties
+    )
+    if visual:
+        # A hair below z = 0, where Meshcat has a grid of its own.
+        floor = GeometryInstance(
+            RigidTransform([0.0, 0.0, -0.001]), _floor().Clone(), "floor"
+        )
+        floor.set_illustration_properties(IllustrationProperties())
+        plant.RegisterVisualGeometry(world, floor)
+
+
+def _floor() -> Mesh:
+    """Returns the floor; a mesh in memory, as Drake's shapes have but one colour."""
+    side = _TILES + 1
+    obj = ["mtllib floor.mtl"]
+    corners = [(k - _TILES / 2) * _TILE for k in range(side)]
+    obj += [f"v {x} {y} 0" for x in corners for y in corners]
+    for parity, material in enumerate(("light", "dark")):
+        obj.append(f"usemtl {material}")
+        for i in range(_TILES):
+            for j in range((i + parity) % 2, _TILES, 2):
+                k = i * side + j + 1
+                obj.append(f"f {k} {k + side} {k + side + 1} {k + 1}")
+    return Mesh(
+        InMemoryMesh(
+            mesh_file=MemoryFile("\n".join(obj), ".obj", "floor.obj"),
+            supporting_files={"floor.mtl": MemoryFile(_MATERIALS, ".mtl", "floor.mtl")},
+        )
+    )
