@@ -63,7 +63,7 @@ class Actor(nn.Module):
     def forward(self, observation: Tensor) -> Tensor:
         """Returns actions (..., 12) for observations (..., OBSERVATION_SIZE)."""
         normal = (observation - self.mean) / torch.sqrt(self.variance + 1e-8)
-        return self.layers(normal.clamp(-OBSERVATION_CLIP, OBSERVATION_CLIP))  # type: ignore[no-any-return]
+        return self.layers(normal.clamp(-OBSERVATION_CLIP, OBSERVATION_CLIP))
 
 
 def save_actor(actor: Actor, path: Path, *, half: bool = False) -> None:

@@ -1,6 +1,6 @@
 """The one type that generator, smoother, player, policy and reward exchange."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -84,11 +84,8 @@ class Plan:
 
     def tail(self, first: int) -> "Plan":
         """Returns the plan from sample ``first`` on."""
-        return Plan(
-            self.start_time + first * PLAN_DT,
-            *(getattr(self, name)[first:].copy() for name in _ARRAYS),
-            open_ended=self.open_ended,
-        )
+        arrays = {name: getattr(self, name)[first:].copy() for name in _ARRAYS}
+        return replace(self, start_time=self.start_time + first * PLAN_DT, **arrays)
 
     def index(self, time: float) -> int:
         """Returns the sample nearest to ``time``, at the ends the first or last."""
@@ -110,9 +107,9 @@ def make_plan(
     """Returns a Plan, its toes computed from ``q`` by the robot's kinematics."""
     p_BF = toe_positions(robot, q[:, 7:])
     p_WF = q[:, None, 4:7] + quat_rotate(q[:, None, :4], p_BF)
-    if path_time is None:
-        path_time = np.arange(len(q)) * PLAN_DT
-    return Plan(start_time, q, v, p_WF, contacts, labels, path_time, open_ended)
+    written = PLAN_DT * np.arange(len(q), dtype=np.float64)
+    times = written if path_time is None else path_time
+    return Plan(start_time, q, v, p_WF, contacts, labels, times, open_ended)
 
 
 def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> Plan:
@@ -146,11 +143,11 @@ def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> P
 
 def join_plans(first: Plan, second: Plan) -> Plan:
     """Returns one plan; ``second`` must start one sample after ``first`` ends."""
-    return Plan(
-        first.start_time,
-        *(np.concatenate((getattr(first, n), getattr(second, n))) for n in _ARRAYS),
-        open_ended=second.open_ended,
-    )
+    arrays: dict[str, Any] = {
+        name: np.concatenate((getattr(first, name), getattr(second, name)))
+        for name in _ARRAYS
+    }
+    return replace(second, start_time=first.start_time, **arrays)
 
 
 def standing_plan(robot: Robot, start_time: float = 0.0) -> Plan:

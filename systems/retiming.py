@@ -84,7 +84,7 @@ class _JointPath(AbstractGeometricPath):
         return self._interval, self(self._interval)
 
 
-class _FreeEndTOPPRA(TOPPRA):  # type: ignore[misc]
+class _FreeEndTOPPRA(TOPPRA):
     """TOPP-RA that may end at any speed up to ``sd_end``, not at ``sd_end`` itself."""
 
     def compute_controllable_sets(self, sdmin: float, sdmax: float) -> Array:
@@ -139,7 +139,8 @@ def retime(
     grid = np.linspace(start, end, count + 1)
     if start_rate > 1 - 1e-6 and _feasible(spline, grid, limits):
         steps = int(np.floor((commit - start) / PLAN_DT + 1e-6))
-        return Clock(start + PLAN_DT * np.arange(steps + 1), np.ones(steps + 1))
+        elapsed = PLAN_DT * np.arange(steps + 1, dtype=np.float64)
+        return Clock(start + elapsed, np.ones(steps + 1))
     rates = _solve(spline, grid, limits, start_rate)
     return _sample(grid, rates, commit)
 

@@ -32,7 +32,7 @@ def save_checkpoint(
     for index, moments in optimizer["state"].items():
         for name, value in moments.items():
             tensors[f"optimizer/{index}/{name}"] = value
-    statistics = learner.get_vec_normalize_env().obs_rms
+    statistics = learner.statistics
     tensors["normalizer/mean"] = torch.from_numpy(statistics.mean)
     tensors["normalizer/variance"] = torch.from_numpy(statistics.var)
     tensors["sampler/scores"] = torch.from_numpy(sampler.scores)
@@ -83,7 +83,7 @@ def restore(
     optimizer = learner.policy.optimizer
     groups = optimizer.state_dict()["param_groups"]
     optimizer.load_state_dict({"state": moments, "param_groups": groups})
-    statistics = learner.get_vec_normalize_env().obs_rms
+    statistics = learner.statistics
     statistics.mean = part("normalizer")["mean"].numpy()
     statistics.var = part("normalizer")["variance"].numpy()
     statistics.count = state["normalizer_count"]

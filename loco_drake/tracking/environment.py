@@ -64,9 +64,9 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
 
     Observations are those of :mod:`loco_drake.systems.observation`, actions those of
     :class:`loco_drake.systems.joint_targets.JointTargets`, rewards the sum of
-    :func:`loco_drake.systems.tracking_reward.reward_terms`, at most 1 a step. An episode
-    starts in a state of the plan (Peng et al. 2018, reference state initialization),
-    terminates when the robot falls or loses its plan and is truncated when its time or
+    :func:`loco_drake.systems.tracking_reward.reward_terms`, at most 1 a step. An
+    episode starts in a state of the plan (reference state initialization, Peng et al.
+    2018), terminates when the robot falls or loses its plan and is truncated when its time or
     its plan is over.
 
     ``info`` holds the reward's terms by name, and the plan and sample that the episode
@@ -161,4 +161,4 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
 
     def _observe(self) -> Observation:
         observation = self._ports["observation"].Eval(self._context)
-        return observation.astype(np.float32)  # type: ignore[no-any-return]
+        return observation.astype(np.float32)

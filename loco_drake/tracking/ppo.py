@@ -1,11 +1,11 @@
 """Proximal policy optimization: stable-baselines3's, with a rate set by the KL."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
-import numpy as np
 import torch
 from stable_baselines3 import PPO
+from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
 
 from loco_drake.systems.actor import OBSERVATION_CLIP, Actor, ActorConfig
@@ -41,7 +41,7 @@ class PpoConfig:
     hidden: list[int] = field(default_factory=lambda: [256, 128])
 
 
-class ScaleReward(VecEnvWrapper):  # type: ignore[misc]
+class ScaleReward(VecEnvWrapper):
     """Multiplies rewards by 1 - gamma, so that returns are between 0 and 1."""
 
     def __init__(self, venv: VecEnv, gamma: float) -> None:
@@ -58,7 +58,7 @@ class ScaleReward(VecEnvWrapper):  # type: ignore[misc]
         return observations, rewards * self._scale, dones, infos
 
 
-class AdaptivePPO(PPO):  # type: ignore[misc]
+class AdaptivePPO(PPO):
     """PPO whose learning rate keeps the KL divergence of an update near a target."""
 
     target: float
@@ -72,6 +72,13 @@ class AdaptivePPO(PPO):  # type: ignore[misc]
             self.rate = max(self.rate / 1.5, 1e-5)
         elif kl < self.target / 2:
             self.rate = min(self.rate * 1.5, 3e-3)
+
+    @property
+    def statistics(self) -> RunningMeanStd:
+        """Mean and variance of the observations."""
+        normalizer = self.get_vec_normalize_env()
+        assert normalizer is not None
+        return cast(RunningMeanStd, normalizer.obs_rms)
 
     def _update_learning_rate(self, optimizers: Any) -> None:
         self.logger.record("train/learning_rate", self.rate)
@@ -122,7 +129,6 @@ def export_actor(learner: AdaptivePPO, config: ActorConfig) -> Actor:
     with torch.no_grad():
         for ours, theirs in zip(actor.layers, trained, strict=True):
             ours.load_state_dict(theirs.state_dict())
-        statistics = learner.get_vec_normalize_env().obs_rms
-        actor.mean.copy_(torch.from_numpy(np.asarray(statistics.mean)))
-        actor.variance.copy_(torch.from_numpy(np.asarray(statistics.var)))
+        actor.mean.copy_(torch.from_numpy(learner.statistics.mean))
+        actor.variance.copy_(torch.from_numpy(learner.statistics.var))
     return actor.eval()

@@ -140,7 +140,7 @@ def train_tracker(
     }
 
 
-class _Saver(BaseCallback):  # type: ignore[misc]
+class _Saver(BaseCallback):
     """Saves and reports after each update."""
 
     def __init__(
@@ -160,6 +160,11 @@ class _Saver(BaseCallback):  # type: ignore[misc]
         self._first = True
         self._start = time.monotonic()
 
+    @property
+    def _learner(self) -> AdaptivePPO:
+        assert isinstance(self.model, AdaptivePPO)
+        return self.model
+
     def _on_step(self) -> bool:
         return True
 
@@ -171,7 +176,7 @@ class _Saver(BaseCallback):  # type: ignore[misc]
         scores = self._sampler.score_by_label()
         for label, score in scores.items():
             self.logger.record(f"return/{label}", score)
-        self.logger.record("train/std", float(_std(self.model)))
+        self.logger.record("train/std", float(_std(self._learner)))
         logged = {
             name: value
             for name, value in self.logger.name_to_value.items()
@@ -185,7 +190,7 @@ class _Saver(BaseCallback):  # type: ignore[misc]
                 **{name: float(value) for name, value in logged.items()},
             }
             log.write(json.dumps(line) + "\n")
-        self.save(self.model)
+        self.save(self._learner)
         self._report(Progress(self.num_timesteps, self._config.steps, scores))
 
     def save(self, learner: AdaptivePPO) -> None:

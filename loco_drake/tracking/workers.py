@@ -1,5 +1,6 @@
 """Environments in worker processes, many to a worker, as one vectorized environment."""
 
+import contextlib
 import multiprocessing
 import signal
 from collections.abc import Sequence
@@ -59,7 +60,7 @@ def _step(
     return observation, reward, done, info
 
 
-class WorkerVecEnv(VecEnv):  # type: ignore[misc]
+class WorkerVecEnv(VecEnv):
     """``workers * per_worker`` TrackingEnvs for stable-baselines3.
 
     Args:
@@ -128,7 +129,7 @@ class WorkerVecEnv(VecEnv):  # type: ignore[misc]
         self._lengths += 1
         for i in np.flatnonzero(dones):
             info = infos[i]
-            # Steps lost to a fall count as zero; those cut off by the plan's end do not.
+            # Steps lost to a fall count as 0; those cut off by the plan's end do not.
             steps = (
                 self._lengths[i] if info["TimeLimit.truncated"] else self._episode_steps
             )
@@ -150,10 +151,8 @@ class WorkerVecEnv(VecEnv):  # type: ignore[misc]
     def close(self) -> None:
         """Ends the workers."""
         for pipe in self._pipes:
-            try:
+            with contextlib.suppress(BrokenPipeError, OSError):
                 pipe.send(None)
-            except (BrokenPipeError, OSError):
-                pass
             pipe.close()
         for process in self._processes:
             process.join(timeout=5)
