@@ -1,0 +1,97 @@
+"""The command ``generate``."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from loco_drake.cli.output import print_table, write_json
+from loco_drake.errors import InputError, check_choice
+from loco_drake.gaits import parse_label
+from loco_drake.generation.generate import (
+    check_duration,
+    check_sampling,
+    generate_motions,
+)
+from loco_drake.generation.motion_model import load_motion_model
+from loco_drake.generation.pretrained import pretrained_path
+from loco_drake.models.robots import ROBOTS
+from loco_drake.motion import FPS, save_motion
+
+BATCH = 32  # motions side by side
+
+
+@dataclass(kw_only=True)
+class Generate:
+    """Generates motions and writes them as Motion files, at 50 frames/s."""
+
+    gait: str = "dog-trot"
+    """Gait label SOURCE-GAIT, such as dog-pace."""
+    duration: float = 10.0
+    """Length of each motion in s, above 0 and at most 600."""
+    count: int = 1
+    """How many motions."""
+    seed: int = 0
+    """Of the first motion; each further one has the next."""
+    robot: str = "go2"
+    """The robot: go2 or a1."""
+    out: Path = Path("motions/generated")
+    """Folder for the Motion files."""
+    temperature: float = 1.0
+    """Above 1 more varied, below 1 more typical, 0 always the likeliest."""
+    top_p: float = 0.95
+    """Only the likeliest codes that together have this probability are drawn."""
+    tokenizer: Path | None = None
+    """Weights from `train tokenizer`. Default: those that come with the package."""
+    generator: Path | None = None
+    """Weights from `train generator`. Default: those that come with the package."""
+    json: Path | None = None
+    """Writes the figures to this file."""
+
+    def run(self) -> int:
+        """Writes the files and prints the figures; returns 0.
+
+        Raises:
+            InputError: if an option is wrong.
+        """
+        label = parse_label(self.gait)
+        check_duration(self.duration)
+        check_sampling(self.temperature, self.top_p)
+        check_choice("robot", self.robot, ROBOTS)
+        if self.count < 1:
+            raise InputError(f"--count must be 1 or more, not {self.count}.")
+        if self.seed < 0:
+            raise InputError(f"--seed must be 0 or more, not {self.seed}.")
+        model = load_motion_model(
+            self.tokenizer or pretrained_path("tokenizer"),
+            self.generator or pretrained_path("generator"),
+            self.robot,
+        )
+        seconds, frames = 0.0, 0
+        for first in range(self.seed, self.seed + self.count, BATCH):
+            seeds = range(first, min(first + BATCH, self.seed + self.count))
+            start = time.perf_counter()
+            motions = generate_motions(
+                model,
+                label,
+                self.duration,
+                seeds,
+                temperature=self.temperature,
+                top_p=self.top_p,
+            )
+            seconds += time.perf_counter() - start
+            for seed, motion in zip(seeds, motions, strict=True):
+                save_motion(motion, self.out / f"{label}-{seed}.npz")
+                frames += len(motion)
+        figures = {
+            "count": self.count,
+            "frames_per_second": frames / seconds,
+            "tokens_per_second": frames / model.frames_per_token / seconds,
+            "times_real_time": frames / FPS / seconds,
+        }
+        write_json(self.json, figures)
+        print_table(
+            f"{self.count} motions of {self.duration:g} s in {self.out}",
+            ["figure", "value"],
+            [[key.replace("_", " "), f"{value:.4g}"] for key, value in figures.items()],
+        )
+        return 0

@@ -1,0 +1,81 @@
+"""The command ``train generator``."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from loco_drake.cli.output import print_table, write_json
+from loco_drake.cli.training import check_steps, print_stopped
+from loco_drake.generation.generator import GeneratorConfig
+from loco_drake.generation.library import load_library
+from loco_drake.generation.tokenizer import load_tokenizer
+from loco_drake.generation.train_generator import score_generator, train_generator
+from loco_drake.generation.training import LoopSettings
+
+
+@dataclass(kw_only=True)
+class TrainGenerator:
+    """Trains the GPT that writes tokens for a gait and a duration.
+
+    Ctrl-C saves a checkpoint and stops; --resume goes on from it.
+    """
+
+    motions: Path = Path("motions/go2")
+    """Folder of Motion files, those that the tokenizer was trained on."""
+    tokenizer: Path = Path("runs/tokenizer/tokenizer.safetensors")
+    """Weights from `train tokenizer`."""
+    out: Path = Path("runs/generator")
+    """Folder for the weights (generator.safetensors), checkpoint and logs."""
+    steps: int = 3000
+    """Optimizer steps."""
+    learning_rate: float = 1e-3
+    """Highest learning rate."""
+    held_out: float = 0.15
+    """Share of each gait's time that is held out, by recording, to test on."""
+    seed: int = 0
+    """Of the weights, the batches and the recordings held out."""
+    resume: bool = False
+    """Go on from the checkpoint in --out."""
+    json: Path | None = None
+    """Writes the figures to this file."""
+
+    def run(self) -> int:
+        """Trains; returns 1 if it was stopped before its last step, else 0.
+
+        Raises:
+            InputError: if an option is wrong.
+        """
+        check_steps(self.steps, self.learning_rate, self.held_out)
+        library = load_library(self.motions, self.held_out, self.seed)
+        tokenizer = load_tokenizer(self.tokenizer)
+        config = GeneratorConfig(
+            tokenizer=tokenizer.fingerprint,
+            books=tokenizer.config.books,
+            book_size=tokenizer.config.book_size,
+            frames_per_token=tokenizer.config.frames_per_token,
+            labels=tuple(str(label) for label in library.labels),
+        )
+        settings = LoopSettings(
+            out=self.out,
+            steps=self.steps,
+            learning_rate=self.learning_rate,
+            weight_decay=0.1,
+            seed=self.seed,
+            resume=self.resume,
+        )
+        start = time.perf_counter()
+        generator, result = train_generator(library, tokenizer, config, settings)
+        if result.stopped:
+            return print_stopped(result.steps, self.steps)
+        figures = {"steps": result.steps, "wall_clock_s": time.perf_counter() - start}
+        for name, clips in (("train", library.train), ("held_out", library.held_out)):
+            if clips:
+                figures[f"{name}_nats_per_code"] = score_generator(
+                    generator, tokenizer, clips
+                )
+        write_json(self.json, figures)
+        rows = [
+            [key.replace("_", " "), f"{value:.4g}"] for key, value in figures.items()
+        ]
+        print_table(f"{self.out / 'generator.safetensors'}", ["figure", "value"], rows)
+        return 0

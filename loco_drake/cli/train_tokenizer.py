@@ -1,0 +1,88 @@
+"""The command ``train tokenizer``."""
+
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from loco_drake.cli.output import print_table, write_json
+from loco_drake.cli.training import check_steps, print_stopped
+from loco_drake.generation.library import load_library
+from loco_drake.generation.tokenizer import TokenizerConfig
+from loco_drake.generation.train_tokenizer import (
+    codebook_use,
+    score_tokenizer,
+    train_tokenizer,
+)
+from loco_drake.generation.training import LoopSettings
+
+
+@dataclass(kw_only=True)
+class TrainTokenizer:
+    """Trains the VQ-VAE that turns motion into tokens and back.
+
+    Ctrl-C saves a checkpoint and stops; --resume goes on from it.
+    """
+
+    motions: Path = Path("motions/go2")
+    """Folder of Motion files, such as `retarget` writes."""
+    out: Path = Path("runs/tokenizer")
+    """Folder for the weights (tokenizer.safetensors), checkpoint and logs."""
+    steps: int = 6000
+    """Optimizer steps."""
+    learning_rate: float = 2e-3
+    """Highest learning rate."""
+    held_out: float = 0.15
+    """Share of each gait's time that is held out, by recording, to test on."""
+    seed: int = 0
+    """Of the weights, the batches and the recordings held out."""
+    resume: bool = False
+    """Go on from the checkpoint in --out."""
+    json: Path | None = None
+    """Writes the figures to this file."""
+
+    def run(self) -> int:
+        """Trains; returns 1 if it was stopped before its last step, else 0.
+
+        Raises:
+            InputError: if an option is wrong.
+        """
+        check_steps(self.steps, self.learning_rate, self.held_out)
+        library = load_library(self.motions, self.held_out, self.seed)
+        settings = LoopSettings(
+            out=self.out,
+            steps=self.steps,
+            learning_rate=self.learning_rate,
+            seed=self.seed,
+            resume=self.resume,
+        )
+        start = time.perf_counter()
+        tokenizer, result = train_tokenizer(
+            library, TokenizerConfig(robots=library.robots), settings
+        )
+        if result.stopped:
+            return print_stopped(result.steps, self.steps)
+        figures: dict[str, object] = {
+            "steps": result.steps,
+            "wall_clock_s": time.perf_counter() - start,
+            "codebook_use": codebook_use(tokenizer, library.train + library.held_out),
+        }
+        for name, clips in (("train", library.train), ("held_out", library.held_out)):
+            if clips:
+                score = asdict(score_tokenizer(tokenizer, clips))
+                del score["codebook_use"]
+                figures[name] = score
+        write_json(self.json, figures)
+        rows = []
+        for name in ("train", "held_out"):
+            score = figures.get(name)
+            if isinstance(score, dict):
+                degrees = f"{score['joint_rmse_rad']:.4f}"
+                toes = f"{score['toe_error_rmse_m'] * 1000:.1f}"
+                rows.append([name.replace("_", " "), degrees, toes])
+        print_table(
+            f"{self.out / 'tokenizer.safetensors'}: {figures['codebook_use']:.0%} of "
+            f"the codes are used",
+            ["clips", "joint RMSE rad", "toe error mm"],
+            rows,
+        )
+        return 0

@@ -1,0 +1,27 @@
+"""What the ``train`` commands of the networks share."""
+
+from math import isfinite
+
+from rich.console import Console
+
+from loco_drake.errors import InputError
+
+
+def check_steps(steps: int, learning_rate: float, held_out: float) -> None:
+    """Raises InputError unless the options of a training can be used."""
+    if steps < 1:
+        raise InputError(f"--steps must be 1 or more, not {steps}.")
+    if not (isfinite(learning_rate) and learning_rate > 0):
+        raise InputError(f"--learning-rate must be above 0, not {learning_rate:g}.")
+    if not 0 <= held_out < 1:
+        raise InputError(
+            f"--held-out must be at least 0 and below 1, not {held_out:g}."
+        )
+
+
+def print_stopped(done: int, steps: int) -> int:
+    """Says on stderr how to go on; returns the exit status of unfinished work."""
+    Console(stderr=True, highlight=False).print(
+        f"Stopped after {done} of {steps} steps; the same command with --resume goes on."
+    )
+    return 1

@@ -1,0 +1,108 @@
+"""Motion as a sequence of feature vectors that say nothing of place and heading.
+
+A frame is described relative to the one before it, in its heading frame H: z up, x
+along the trunk's heading, half-way between the headings of the two frames. Lengths
+are in units of the robot's stand height, so that features of one robot make sense to
+another of like proportions.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.models.robots import Robot
+from loco_drake.motion import FPS, Motion
+from loco_drake.rotations import quat_conjugate, quat_multiply, yaw_of, yaw_quat
+
+Array = NDArray[np.float64]
+
+# Columns of a feature vector.
+VELOCITY = slice(0, 2)  # v_WB along x and y of H, in stand heights per second
+YAW_RATE = slice(2, 3)  # rad/s
+HEIGHT = slice(3, 4)  # of the trunk frame over the ground, in stand heights
+ROLL_PITCH = slice(4, 6)  # rad
+JOINTS = slice(6, 18)  # rad, in the order of robot.joint_names
+CONTACTS = slice(18, 22)  # 1 on the ground, 0 in the air; FL, FR, RL, RR
+SIZE = 22
+
+
+def motion_features(robot: Robot, motion: Motion) -> Array:
+    """Returns the features of ``motion``, shape (T, SIZE).
+
+    The first frame has none before it: its velocity and yaw rate are those of the
+    second.
+
+    Raises:
+        ValueError: if the motion is of another robot or not at FPS.
+    """
+    if motion.robot != robot.name:
+        raise ValueError(f"the motion is of {motion.robot}, not of {robot.name}")
+    if motion.fps != FPS:
+        raise ValueError(f"the motion is at {motion.fps} frames/s, not at {FPS}")
+    yaw = np.unwrap(yaw_of(motion.base_quaternion))
+    turn = np.diff(yaw)
+    step = np.diff(motion.base_position[:, :2], axis=0)
+    step_H = rotate_plane(step, -(yaw[:-1] + turn / 2))
+    features = np.empty((len(motion), SIZE))
+    features[1:, VELOCITY] = step_H * FPS / robot.stand_height
+    features[1:, YAW_RATE] = turn[:, None] * FPS
+    features[0, :3] = features[1, :3]
+    features[:, HEIGHT] = motion.base_position[:, 2:] / robot.stand_height
+    features[:, ROLL_PITCH] = _roll_pitch(motion.base_quaternion, yaw)
+    features[:, JOINTS] = motion.joint_positions
+    features[:, CONTACTS] = motion.contacts
+    return features
+
+
+def integrate_path(robot: Robot, features: Array, pose: Array) -> Array:
+    """Returns the path of the base that features describe.
+
+    The exact inverse of the differences in :func:`motion_features`.
+
+    Args:
+        robot: gives the unit of length.
+        features: shape (..., T, SIZE).
+        pose: x, y in m and yaw in rad of the frame before the first, shape (..., 3).
+
+    Returns:
+        x, y, yaw of the T frames, shape (..., T, 3).
+    """
+    turn = features[..., YAW_RATE][..., 0] / FPS
+    yaw = pose[..., None, 2] + np.cumsum(turn, axis=-1)
+    step_H = features[..., VELOCITY] * robot.stand_height / FPS
+    steps = rotate_plane(step_H, yaw - turn / 2)
+    xy = pose[..., None, :2] + np.cumsum(steps, axis=-2)
+    return np.concatenate((xy, yaw[..., None]), axis=-1)
+
+
+def positions(robot: Robot, features: Array, path: Array) -> Array:
+    """Returns q = [R_WB as w x y z, p_WB, joints], shape (..., T, 19).
+
+    Args:
+        robot: gives the unit of length.
+        features: shape (..., T, SIZE).
+        path: x, y, yaw of each frame, shape (..., T, 3).
+    """
+    half_roll, half_pitch = np.moveaxis(features[..., ROLL_PITCH], -1, 0) / 2
+    zero = np.zeros_like(half_roll)
+    q_roll = np.stack((np.cos(half_roll), np.sin(half_roll), zero, zero), axis=-1)
+    q_pitch = np.stack((np.cos(half_pitch), zero, np.sin(half_pitch), zero), axis=-1)
+    q_HB = quat_multiply(q_pitch, q_roll)
+    q_WB = quat_multiply(yaw_quat(path[..., 2]), q_HB)
+    height = features[..., HEIGHT] * robot.stand_height
+    return np.concatenate((q_WB, path[..., :2], height, features[..., JOINTS]), axis=-1)
+
+
+def _roll_pitch(q_WB: Array, yaw: Array) -> Array:
+    """Returns roll about x and pitch about y, in rad, after the yaw is undone."""
+    q_HB = quat_multiply(quat_conjugate(yaw_quat(yaw)), q_WB)
+    w, x, y, z = np.moveaxis(q_HB, -1, 0)
+    roll = np.arctan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+    return np.stack((roll, pitch), axis=-1)
+
+
+def rotate_plane(vectors: Array, angles: Array) -> Array:
+    """Returns plane vectors (..., 2) turned by ``angles`` (...) rad."""
+    cos, sin = np.cos(angles), np.sin(angles)
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack((cos * x - sin * y, sin * x + cos * y), axis=-1)

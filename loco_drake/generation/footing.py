@@ -1,0 +1,134 @@
+"""Feet that stay where they land, and never below the ground.
+
+A decoder's base speed and leg angles never agree to the last millimetre, and what is
+left is a foot that slides. Here a foot in contact is held where it landed, the base's
+path is drawn towards where the standing feet say that it is, and what a swinging foot
+is off by fades away. Every frame depends on the ones before it only.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.generation import features as ft
+from loco_drake.generation.features import positions, rotate_plane
+from loco_drake.models.kinematics import leg_joints, toe_positions
+from loco_drake.models.robots import Robot
+from loco_drake.motion import FPS
+from loco_drake.rotations import quat_conjugate, quat_rotate
+
+Array = NDArray[np.float64]
+
+BASE_GAIN = 0.15  # share of the standing feet's mean offset that the base takes over
+SWING_DECAY = 0.8  # of a swinging foot's offset, a frame
+SETTLING = 0.5  # share of its height over the ground that a standing foot loses
+REACH = 0.06  # m, a foot that would have to be moved farther slides
+TOUCHING, LIFTING = 0.55, 0.45  # probabilities at which a contact begins and ends
+
+
+@dataclass(frozen=True, eq=False)
+class Footing:
+    """Where base and feet are after a frame, for B motions side by side.
+
+    Attributes:
+        pose: x, y in m and yaw in rad of the base, shape (B, 3).
+        anchor: where each foot landed, x and y in m, shape (B, 4, 2).
+        offset: by how much each toe is moved in W, in m, shape (B, 4, 3).
+        contacts: which feet stand, shape (B, 4).
+    """
+
+    pose: Array
+    anchor: Array
+    offset: Array
+    contacts: NDArray[np.bool_]
+
+
+def start_footing(pose: Array) -> Footing:
+    """Returns the footing of a base at ``pose`` (B, 3) with no foot down yet."""
+    batch = len(pose)
+    return Footing(
+        pose=pose,
+        anchor=np.zeros((batch, 4, 2)),
+        offset=np.zeros((batch, 4, 3)),
+        contacts=np.zeros((batch, 4), dtype=np.bool_),
+    )
+
+
+def step_footing(
+    robot: Robot, footing: Footing, features: Array
+) -> tuple[Footing, Array, NDArray[np.bool_]]:
+    """Places T frames of B motions in the world.
+
+    Args:
+        robot: whose legs.
+        footing: after the frame before.
+        features: with contacts as probabilities, shape (B, T, SIZE).
+
+    Returns:
+        Footing after the last frame; q as in :func:`features.positions`, shape
+        (B, T, 19); contacts, shape (B, T, 4).
+    """
+    frames = features.shape[1]
+    pose, anchor, offset, down = (
+        footing.pose,
+        footing.anchor,
+        footing.offset,
+        footing.contacts,
+    )
+    p_HF = _toes(robot, features)
+    turn = features[..., ft.YAW_RATE][..., 0] / FPS
+    step_H = features[..., ft.VELOCITY] * robot.stand_height / FPS
+    likely = features[..., ft.CONTACTS]
+    poses, offsets, contacts = [], [], []
+    for k in range(frames):
+        yaw = pose[:, 2] + turn[:, k]
+        xy = pose[:, :2] + rotate_plane(step_H[:, k], pose[:, 2] + turn[:, k] / 2)
+        toes = xy[:, None] + rotate_plane(p_HF[:, k, :, :2], yaw[:, None])
+        was_down = down
+        down = likely[:, k] > np.where(was_down, LIFTING, TOUCHING)
+        landing = down & ~was_down
+        anchor = np.where(landing[..., None], toes + offset[..., :2], anchor)
+        wanted = anchor - toes
+        size = np.sqrt((wanted * wanted).sum(axis=-1, keepdims=True))
+        held = wanted * np.minimum(1.0, REACH / np.maximum(size, REACH))
+        # The base goes where the standing feet on average say that it is.
+        weight = down[..., None] / np.maximum(down.sum(axis=1), 1)[:, None, None]
+        shift = BASE_GAIN * (held * weight).sum(axis=1)
+        xy, toes = xy + shift, toes + shift[:, None]
+        faded = SWING_DECAY * offset
+        level = offset[..., 2] + SETTLING * (
+            robot.foot_radius - p_HF[:, k, :, 2] - offset[..., 2]
+        )
+        offset = np.where(
+            down[..., None],
+            np.concatenate((held - shift[:, None], level[..., None]), axis=-1),
+            faded,
+        )
+        anchor = np.where(down[..., None], toes + offset[..., :2], anchor)
+        pose = np.concatenate((xy, yaw[:, None]), axis=-1)
+        poses.append(pose)
+        offsets.append(offset)
+        contacts.append(down)
+    after = Footing(pose, anchor, offset, down)
+    q = positions(robot, features, np.stack(poses, axis=1))
+    moved = np.stack(offsets, axis=1)
+    return after, _move_toes(robot, q, moved), np.stack(contacts, axis=1)
+
+
+def _toes(robot: Robot, features: Array) -> Array:
+    """Returns toes relative to the ground under the trunk in H, (B, T, 4, 3)."""
+    level = np.zeros((*features.shape[:-1], 3))
+    q = positions(robot, features, level)
+    p_BF = toe_positions(robot, q[..., 7:])
+    return quat_rotate(q[..., None, :4], p_BF) + q[..., None, 4:7]
+
+
+def _move_toes(robot: Robot, q: Array, offset: Array) -> Array:
+    """Returns q with the toes moved by ``offset`` in W, and none below the ground."""
+    q_WB, p_WB = q[..., None, :4], q[..., None, 4:7]
+    p_WF = quat_rotate(q_WB, toe_positions(robot, q[..., 7:])) + p_WB + offset
+    p_WF[..., 2] = np.maximum(p_WF[..., 2], robot.foot_radius)
+    joints = leg_joints(robot, quat_rotate(quat_conjugate(q_WB), p_WF - p_WB))
+    joints = np.clip(joints, robot.joint_lower, robot.joint_upper)
+    return np.concatenate((q[..., :7], joints), axis=-1)

@@ -1,0 +1,101 @@
+"""Whole motions from a motion model."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from loco_drake.errors import InputError
+from loco_drake.gaits import GaitLabel
+from loco_drake.generation.motion_model import MotionModel
+from loco_drake.motion import FPS, Motion
+
+LONGEST_DURATION = 600.0  # s
+
+
+def generate_motions(
+    model: MotionModel,
+    label: GaitLabel,
+    duration: float,
+    seeds: Sequence[int],
+    *,
+    temperature: float = 1.0,
+    top_p: float = 0.95,
+) -> list[Motion]:
+    """Generates one motion for each seed, side by side.
+
+    Args:
+        model: from :mod:`loco_drake.generation.pretrained` or one's own training.
+        label: one that the generator was trained on.
+        duration: from first to last frame, in s, at most LONGEST_DURATION.
+        seeds: not negative; each motion depends on its own only.
+        temperature: see :meth:`MotionModel.extend`.
+        top_p: see there.
+
+    Raises:
+        InputError: if an argument is not as said.
+    """
+    check_duration(duration)
+    check_sampling(temperature, top_p)
+    if any(seed < 0 for seed in seeds):
+        raise InputError("Seeds must be 0 or more.")
+    count = round(duration * FPS) + 1
+    stream = model.start(np.array(seeds), duration)
+    labels = np.full(len(seeds), label.index)
+    parts = []
+    for _ in range(-(-count // model.chunk_frames)):
+        stream, frames = model.extend(
+            stream, labels, temperature=temperature, top_p=top_p
+        )
+        parts.append(frames)
+    q = np.concatenate([part.q for part in parts], axis=1)[:, :count]
+    v = np.concatenate([part.v for part in parts], axis=1)[:, :count]
+    contacts = np.concatenate([part.contacts for part in parts], axis=1)[:, :count]
+    return [
+        Motion(
+            robot=model.robot.name,
+            source=label.source,
+            gait=label.gait,
+            fps=FPS,
+            joint_names=model.robot.joint_names,
+            base_position=q[i, :, 4:7].copy(),
+            base_quaternion=q[i, :, :4].copy(),
+            joint_positions=q[i, :, 7:].copy(),
+            base_velocity=v[i, :, 3:6].copy(),
+            base_angular_velocity=v[i, :, :3].copy(),
+            joint_velocities=v[i, :, 6:].copy(),
+            contacts=contacts[i].copy(),
+            provenance={
+                "generated": f"{label} for {duration:g} s",
+                "seed": str(seed),
+                "temperature": f"{temperature:g}",
+                "top_p": f"{top_p:g}",
+                "tokenizer": model.tokenizer.fingerprint,
+            },
+        )
+        for i, seed in enumerate(seeds)
+    ]
+
+
+def generate_motion(
+    model: MotionModel, label: GaitLabel, duration: float, seed: int
+) -> Motion:
+    """Generates one motion; see :func:`generate_motions`."""
+    (motion,) = generate_motions(model, label, duration, [seed])
+    return motion
+
+
+def check_duration(duration: float) -> None:
+    """Raises InputError unless ``duration`` is in (0, LONGEST_DURATION] s."""
+    if not (np.isfinite(duration) and 0 < duration <= LONGEST_DURATION):
+        raise InputError(
+            f"The duration must be above 0 and at most {LONGEST_DURATION:g} s, "
+            f"not {duration:g}."
+        )
+
+
+def check_sampling(temperature: float, top_p: float) -> None:
+    """Raises InputError unless the temperature is >= 0 and top_p in (0, 1]."""
+    if not (np.isfinite(temperature) and temperature >= 0):
+        raise InputError(f"The temperature must be 0 or more, not {temperature:g}.")
+    if not 0 < top_p <= 1:
+        raise InputError(f"top_p must be above 0 and at most 1, not {top_p:g}.")

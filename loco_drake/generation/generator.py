@@ -1,0 +1,285 @@
+"""A GPT that writes tokens of motion for a source, a gait and a duration.
+
+One transformer step per token. The codes of a token's books are drawn one after the
+other by small heads that see the transformer's output and the codes drawn so far,
+as residual books refine one another.
+"""
+
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+from torch.nn import functional
+
+from loco_drake.errors import InputError
+from loco_drake.gaits import ONE_HOT, ONE_HOT_SIZE
+from loco_drake.generation.layers import RotaryAttention
+from loco_drake.weights import load_into, load_weights, save_weights
+
+# Durations are binned on a log scale; the last bin is "long" and never ends.
+DURATION_BINS = 16
+SHORTEST, LONGEST = 0.5, 16.0  # s
+
+
+@dataclass(frozen=True)
+class GeneratorConfig:
+    """What is needed to build a :class:`Generator`.
+
+    Attributes:
+        tokenizer: fingerprint of the tokenizer whose codes it writes.
+        books: codebooks of that tokenizer.
+        book_size: codes in a book.
+        frames_per_token: frames that a token stands for.
+        labels: names of the gait labels it was trained on.
+        window: earlier tokens that it looks at when a chunk begins.
+        width: channels.
+        layers: transformer blocks.
+        heads: attention heads.
+        dropout: probability, while training.
+    """
+
+    tokenizer: str
+    books: int
+    book_size: int
+    frames_per_token: int
+    labels: tuple[str, ...]
+    window: int = 24
+    width: int = 128
+    layers: int = 4
+    heads: int = 4
+    dropout: float = 0.2
+
+
+# Keys and values of each layer for the times seen so far.
+Cache = list[tuple[Tensor, Tensor]]
+
+
+class Block(nn.Module):
+    """A transformer block: attention, then a layer of its own for each time.
+
+    Args:
+        config: its sizes.
+    """
+
+    def __init__(self, config: GeneratorConfig) -> None:
+        super().__init__()
+        width = config.width
+        self.norm_attention = nn.LayerNorm(width)
+        self.attention = RotaryAttention(width, config.heads, config.dropout)
+        self.mlp = nn.Sequential(
+            nn.LayerNorm(width),
+            nn.Linear(width, 4 * width),
+            nn.GELU(),
+            nn.Linear(4 * width, width),
+        )
+        self.dropout = nn.Dropout(config.dropout)
+
+    def forward(
+        self, x: Tensor, past: tuple[Tensor, Tensor] | None
+    ) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+        """Maps (B, T, width) to the same; see :class:`RotaryAttention`."""
+        attended, present = self.attention(self.norm_attention(x), past)
+        x = x + self.dropout(attended)
+        return x + self.dropout(self.mlp(x)), present
+
+
+class Generator(nn.Module):
+    """The GPT over tokens, conditioned at every step on label and duration.
+
+    Step t is given the codes of token t - 1 and the condition of token t, and
+    predicts the codes of token t. A code of ``book_size`` stands for "nothing
+    before": the start of a sequence.
+
+    Args:
+        config: its sizes.
+    """
+
+    def __init__(self, config: GeneratorConfig) -> None:
+        super().__init__()
+        self.config = config
+        width, books, size = config.width, config.books, config.book_size
+        self.register_buffer(
+            "one_hot", torch.tensor(ONE_HOT, dtype=torch.float32), persistent=False
+        )
+        self.one_hot: Tensor
+        # Tables of all books lie in one; book j begins at row j * (size + 1).
+        self.codes_in = nn.Embedding(books * (size + 1), width)
+        self.gait_in = nn.Linear(ONE_HOT_SIZE, width, bias=False)
+        self.duration_in = nn.Embedding(DURATION_BINS, width)
+        self.dropout = nn.Dropout(config.dropout)
+        self.blocks = nn.ModuleList(Block(config) for _ in range(config.layers))
+        self.norm = nn.LayerNorm(width)
+        self.earlier_books = nn.Embedding(books * (size + 1), width)
+        self.head_in = nn.ModuleList(nn.Linear(width, width) for _ in range(books))
+        self.head_out = nn.ModuleList(
+            nn.Sequential(nn.GELU(), nn.LayerNorm(width), nn.Linear(width, size))
+            for _ in range(books)
+        )
+        self.apply(_initialize)
+
+    def trunk(
+        self,
+        before: Tensor,
+        labels: Tensor,
+        duration: Tensor,
+        cache: Cache | None = None,
+    ) -> tuple[Tensor, Cache]:
+        """Returns what the heads are given, shape (B, T, width), and a cache.
+
+        Args:
+            before: codes of the token before each step, shape (B, T, books).
+            labels: index into gaits.LABELS of each step's token, shape (B, T).
+            duration: bin of the sequence's duration, shape (B,).
+            cache: that of the steps before, then T must be 1.
+        """
+        offset = torch.arange(self.config.books) * (self.config.book_size + 1)
+        x = self.codes_in(before + offset).sum(dim=-2)  # (B, T, width)
+        x = x + self.gait_in(self.one_hot[labels]) + self.duration_in(duration)[:, None]
+        x = self.dropout(x)
+        present: Cache = []
+        for i, block in enumerate(self.blocks):
+            x, kv = block(x, None if cache is None else cache[i])
+            present.append(kv)
+        return self.norm(x), present
+
+    def head(self, book: int, hidden: Tensor, earlier: Tensor) -> Tensor:
+        """Returns logits (..., book_size) of one book.
+
+        Args:
+            book: which one.
+            hidden: output of the trunk, shape (..., width).
+            earlier: sum of :meth:`drawn` over the books before, shape (..., width).
+        """
+        logits: Tensor = self.head_out[book](self.head_in[book](hidden) + earlier)
+        return logits
+
+    def drawn(self, book: int, codes: Tensor) -> Tensor:
+        """Returns what the heads of later books are told of a book's codes (...)."""
+        told: Tensor = self.earlier_books(codes + book * (self.config.book_size + 1))
+        return told
+
+    def forward(
+        self, before: Tensor, labels: Tensor, duration: Tensor, codes: Tensor
+    ) -> Tensor:
+        """Returns logits (B, T, books, book_size) of the tokens ``codes``.
+
+        Logits of a book depend on ``before`` up to their step and, within the step,
+        on ``codes`` of earlier books. For the arguments see :meth:`trunk`.
+        """
+        hidden, _ = self.trunk(before, labels, duration)
+        earlier = torch.zeros_like(hidden)
+        logits = []
+        for book in range(self.config.books):
+            logits.append(self.head(book, hidden, earlier))
+            earlier = earlier + self.drawn(book, codes[..., book])
+        return torch.stack(logits, dim=-2)
+
+    @torch.inference_mode()
+    def sample(
+        self,
+        history: Tensor,
+        labels: Tensor,
+        duration: Tensor,
+        uniforms: Tensor,
+        temperature: float,
+        top_p: float,
+    ) -> Tensor:
+        """Returns the codes (B, n, books) of n tokens that go on from ``history``.
+
+        Args:
+            history: codes of the H >= 0 tokens before, shape (B, H, books).
+            labels: of the tokens from one after the first in ``history`` to the last
+                new one (without history: of the new ones), shape (B, H - 1 + n), or
+                (B, n).
+            duration: bin of the sequence's duration, shape (B,).
+            uniforms: the dice, in [0, 1), shape (B, n, books).
+            temperature: divides the logits; 0 takes the likeliest code.
+            top_p: only the likeliest codes that together reach it can be drawn.
+        """
+        batch, steps, books = uniforms.shape
+        if history.shape[1] == 0:
+            history = torch.full((batch, 1, books), self.config.book_size)
+        given = history.shape[1]
+        hidden, cache = self.trunk(history, labels[:, :given], duration)
+        hidden = hidden[:, -1]
+        tokens = []
+        for step in range(steps):
+            earlier = torch.zeros_like(hidden)
+            codes = []
+            for book in range(books):
+                logits = self.head(book, hidden, earlier)
+                drawn = draw(logits, uniforms[:, step, book], temperature, top_p)
+                codes.append(drawn)
+                if book < books - 1:
+                    earlier = earlier + self.drawn(book, drawn)
+            token = torch.stack(codes, dim=-1)[:, None]  # (B, 1, books)
+            tokens.append(token)
+            if step < steps - 1:
+                label = labels[:, given + step, None]
+                hidden, cache = self.trunk(token, label, duration, cache)
+                hidden = hidden[:, -1]
+        return torch.cat(tokens, dim=1)
+
+
+def draw(logits: Tensor, uniforms: Tensor, temperature: float, top_p: float) -> Tensor:
+    """Draws codes (B,) by nucleus sampling (Holtzman et al. 2020).
+
+    Args:
+        logits: shape (B, N).
+        uniforms: in [0, 1), shape (B,); the code is where the cumulated probability
+            of the codes, likeliest first, passes it.
+        temperature: see :meth:`Generator.sample`.
+        top_p: see :meth:`Generator.sample`.
+    """
+    if temperature == 0:
+        return logits.argmax(dim=-1)
+    ordered, order = (logits / temperature).sort(dim=-1, descending=True, stable=True)
+    cumulated = ordered.softmax(dim=-1).double().cumsum(dim=-1)
+    # The nucleus is the shortest head of the list that reaches top_p.
+    size = (cumulated < top_p).sum(dim=-1, keepdim=True).clamp(max=logits.shape[-1] - 1)
+    total = cumulated.gather(-1, size)
+    place = (cumulated <= uniforms[:, None] * total).sum(dim=-1, keepdim=True)
+    return order.gather(-1, torch.minimum(place, size))[:, 0]
+
+
+def duration_bin(seconds: NDArray[np.float64] | float) -> NDArray[np.int64]:
+    """Returns the bin of durations; those past LONGEST share the last."""
+    place = np.log(np.asarray(seconds) / SHORTEST) / math.log(LONGEST / SHORTEST)
+    bins = np.floor(place * (DURATION_BINS - 1))
+    return np.clip(bins, 0, DURATION_BINS - 1).astype(np.int64)
+
+
+def _initialize(module: nn.Module) -> None:
+    """Small normal weights, as in GPT-2 (Radford et al. 2019)."""
+    if isinstance(module, nn.Linear | nn.Embedding):
+        nn.init.normal_(module.weight, std=0.02)
+    if isinstance(module, nn.Linear) and module.bias is not None:
+        nn.init.zeros_(module.bias)
+
+
+def save_generator(generator: Generator, path: Path, info: dict[str, Any]) -> None:
+    """Writes weights in 16 bits; ``info`` is added to the header for people."""
+    config = {"network": asdict(generator.config), "info": info}
+    save_weights(path, "generator", generator.state_dict(), config, half=True)
+
+
+def load_generator(path: Path) -> Generator:
+    """Reads a generator, ready for inference.
+
+    Raises:
+        InputError: if the file is missing, damaged, or of something else.
+    """
+    tensors, config = load_weights(path, "generator")
+    try:
+        network = dict(config["network"])
+        network["labels"] = tuple(network["labels"])
+        generator = Generator(GeneratorConfig(**network))
+    except (KeyError, TypeError, ValueError):
+        raise InputError(f"{path} has a damaged generator header.") from None
+    load_into(generator, tensors, path)
+    return generator.eval().requires_grad_(False)

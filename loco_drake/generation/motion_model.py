@@ -1,0 +1,330 @@
+"""Motion without end, a chunk at a time, from tokenizer and generator."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from loco_drake.errors import InputError
+from loco_drake.gaits import LABELS
+from loco_drake.generation.determinism import single_thread, uniforms
+from loco_drake.generation.footing import Footing, start_footing, step_footing
+from loco_drake.generation.generator import Generator, duration_bin, load_generator
+from loco_drake.generation.tokenizer import Tokenizer, load_tokenizer
+from loco_drake.models.robots import Robot, get_robot
+from loco_drake.motion import FPS
+from loco_drake.rotations import quat_error
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+CHUNK_SECONDS = 1.0
+SETTLING = 4  # frames before the first one in which feet find their ground
+
+
+@dataclass(frozen=True, eq=False)
+class Stream:
+    """Where B motions that are being generated stand. Immutable: copies are itself.
+
+    One frame is always held back: its velocity needs the frame after it.
+
+    Attributes:
+        seeds: of each motion, shape (B,).
+        duration: how long each is to last, in s, shape (B,).
+        chunk: how many times the stream was extended.
+        tokens: the latest ones, shape (B, n, books).
+        labels: of ``tokens``, index into gaits.LABELS, shape (B, n).
+        footing: of base and feet after the frame held back.
+        q: the last frame given out and the one held back, shape (B, 2, 19), or
+            (B, 0, 19) before the first extension.
+        contacts: of the frame held back, shape (B, 4).
+    """
+
+    seeds: Integers
+    duration: Array
+    chunk: int
+    tokens: Integers
+    labels: Integers
+    footing: Footing
+    q: Array
+    contacts: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        for value in (*vars(self).values(), *vars(self.footing).values()):
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    def __copy__(self) -> "Stream":
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Stream":
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Consecutive frames of B motions at motion.FPS, in the order of Drake's plant.
+
+    Attributes:
+        q: R_WB as w, x, y, z, p_WB in m, joints in rad, shape (B, n, 19).
+        v: w_WB_W in rad/s, v_WB_W in m/s, joints in rad/s, shape (B, n, 18); central
+            differences of q.
+        contacts: which feet stand, shape (B, n, 4).
+        labels: index into gaits.LABELS, shape (B, n).
+    """
+
+    q: Array
+    v: Array
+    contacts: NDArray[np.bool_]
+    labels: Integers
+
+    def __getitem__(self, index: int) -> "Frames":
+        """Returns those of one motion, without the first axis."""
+        return Frames(
+            self.q[index], self.v[index], self.contacts[index], self.labels[index]
+        )
+
+
+class MotionModel:
+    """Tokenizer and generator as one source of motion. Never changes once made.
+
+    Args:
+        tokenizer: of the generator.
+        generator: writes the tokens.
+        robot: name of the robot; must be one that the tokenizer knows.
+
+    Raises:
+        InputError: if the three do not belong together.
+    """
+
+    def __init__(self, tokenizer: Tokenizer, generator: Generator, robot: str) -> None:
+        if generator.config.tokenizer != tokenizer.fingerprint:
+            raise InputError(
+                f"The generator's weights are for the tokenizer "
+                f"{generator.config.tokenizer}, not for {tokenizer.fingerprint}; "
+                f"train the generator again after the tokenizer."
+            )
+        if robot not in tokenizer.config.robots:
+            raise InputError(
+                f"The tokenizer's weights are not for the robot {robot!r}; "
+                f"there are weights for {', '.join(tokenizer.config.robots)}."
+            )
+        self.tokenizer = tokenizer.eval()
+        self.generator = generator.eval()
+        self.robot: Robot = get_robot(robot)
+        self.frames_per_token = tokenizer.config.frames_per_token
+        self.chunk_tokens = round(CHUNK_SECONDS * FPS / self.frames_per_token)
+        self._robot_index = tokenizer.config.robots.index(robot)
+        self._known = {
+            index
+            for index, label in enumerate(LABELS)
+            if str(label) in generator.config.labels
+        }
+
+    @property
+    def chunk_frames(self) -> int:
+        """Frames in a chunk of the usual length, about a second."""
+        return self.chunk_tokens * self.frames_per_token
+
+    def start(
+        self,
+        seeds: Integers,
+        duration: Array | float = 3600.0,
+        pose: Array | None = None,
+    ) -> Stream:
+        """Returns a stream of B motions of which nothing is generated yet.
+
+        Args:
+            seeds: one for each motion, not negative, shape (B,). What a motion
+                becomes depends on its own seed only.
+            duration: how long the motions are to last, in s, shape (B,) or for all.
+            pose: x, y, yaw of the first frame in m and rad, shape (B, 3); default 0.
+        """
+        seeds = np.array(seeds, dtype=np.int64)
+        batch = len(seeds)
+        books = self.tokenizer.config.books
+        return Stream(
+            seeds=seeds,
+            duration=np.broadcast_to(np.asarray(duration, np.float64), (batch,)).copy(),
+            chunk=0,
+            tokens=np.zeros((batch, 0, books), dtype=np.int64),
+            labels=np.zeros((batch, 0), dtype=np.int64),
+            footing=start_footing(
+                np.zeros((batch, 3)) if pose is None else np.array(pose, np.float64)
+            ),
+            q=np.zeros((batch, 0, 19)),
+            contacts=np.zeros((batch, 4), dtype=np.bool_),
+        )
+
+    def extend(
+        self,
+        stream: Stream,
+        labels: Integers,
+        tokens: int | None = None,
+        *,
+        temperature: float = 1.0,
+        top_p: float = 0.95,
+    ) -> tuple[Stream, Frames]:
+        """Generates more of each motion.
+
+        The dice are named by (seed, number of the chunk), so that a stream extended
+        again in the same way gives the same frames.
+
+        Args:
+            stream: as it stands; it is left alone.
+            labels: index into gaits.LABELS of each motion (B,), or of each of its
+                new tokens (B, tokens).
+            tokens: how many; default ``chunk_tokens``.
+            temperature: of the generator, see :meth:`Generator.sample`.
+            top_p: of the generator, see there.
+
+        Returns:
+            The stream as it stands then, and ``tokens * frames_per_token`` frames.
+
+        Raises:
+            InputError: if the weights were not trained on a label.
+        """
+        steps = self.chunk_tokens if tokens is None else tokens
+        batch = len(stream.seeds)
+        labels = np.asarray(labels, dtype=np.int64)
+        self._check_labels(labels)
+        new = np.broadcast_to(labels.reshape(batch, -1), (batch, steps))
+        # The first tokens are only there for the decoder to look back at.
+        lead = 0 if stream.chunk else self._lead
+        new = np.concatenate((np.repeat(new[:, :1], lead, axis=1), new), axis=1)
+        shape = (lead + steps, self.tokenizer.config.books)
+        dice = [uniforms(int(seed), stream.chunk, shape) for seed in stream.seeds]
+        window = self.generator.config.window
+        history, given = stream.tokens[:, -window:], stream.labels[:, -window:]
+        with single_thread():
+            drawn = self.generator.sample(
+                torch.from_numpy(history.copy()),
+                torch.from_numpy(np.concatenate((given[:, 1:], new), axis=1)),
+                torch.from_numpy(duration_bin(stream.duration)),
+                torch.from_numpy(np.stack(dice)),
+                temperature,
+                top_p,
+            )
+        return self.append(stream, drawn.numpy(), new)
+
+    def append(
+        self, stream: Stream, tokens: Integers, labels: Integers
+    ) -> tuple[Stream, Frames]:
+        """Decodes tokens that go on from ``stream``.
+
+        Of a stream that was never extended the frames of the first ``_lead`` tokens
+        are not given out.
+
+        Args:
+            stream: as it stands; it is left alone.
+            tokens: shape (B, n, books).
+            labels: of the tokens, shape (B, n).
+        """
+        batch = len(tokens)
+        before = stream.tokens.shape[1]
+        window = np.concatenate((stream.tokens, tokens), axis=1)
+        window_labels = np.concatenate((stream.labels, labels), axis=1)
+        seen = min(before, self.tokenizer.memory)
+        with torch.inference_mode(), single_thread():
+            decoded = self.tokenizer.decode(
+                torch.from_numpy(window[:, before - seen :]),
+                torch.full((batch,), self._robot_index),
+            )
+        features = decoded.numpy()[:, seen * self.frames_per_token :].astype(np.float64)
+        footing, q, held = stream.footing, stream.q, stream.contacts[:, None]
+        if not stream.chunk:
+            lead = self._lead * self.frames_per_token
+            footing, q, held = self._settle(
+                footing, features[:, lead - SETTLING : lead]
+            )
+            features = features[:, lead:]
+        footing, q_new, contacts = step_footing(self.robot, footing, features)
+        q = np.concatenate((q, q_new), axis=1)
+        contacts = np.concatenate((held, contacts), axis=1)
+        frame_labels = np.repeat(
+            window_labels[:, -features.shape[1] // self.frames_per_token - 1 :],
+            self.frames_per_token,
+            axis=1,
+        )
+        keep = max(self.generator.config.window, self.tokenizer.memory)
+        after = replace(
+            stream,
+            chunk=stream.chunk + 1,
+            tokens=window[:, -keep:].copy(),
+            labels=window_labels[:, -keep:].copy(),
+            footing=footing,
+            q=q[:, -2:].copy(),
+            contacts=contacts[:, -1].copy(),
+        )
+        frames = Frames(
+            q=q[:, 1:-1],
+            v=_velocities(q),
+            contacts=contacts[:, :-1],
+            labels=frame_labels[:, self.frames_per_token - 1 : -1],
+        )
+        return after, frames
+
+    @property
+    def _lead(self) -> int:
+        needed = -(-SETTLING // self.frames_per_token)
+        return max(self.tokenizer.memory, needed)
+
+    def _settle(
+        self, footing: Footing, features: Array
+    ) -> tuple[Footing, Array, NDArray[np.bool_]]:
+        """Plays the frames before the first so that the last is at the start pose.
+
+        Returns:
+            Footing, q of the last two frames (B, 2, 19), contacts of the last
+            (B, 1, 4).
+        """
+        there, _, _ = step_footing(
+            self.robot, start_footing(np.zeros_like(footing.pose)), features
+        )
+        start = _compose(footing.pose, _inverse(there.pose))
+        after, q, contacts = step_footing(self.robot, start_footing(start), features)
+        return after, q[:, -2:], contacts[:, -1:]
+
+    def _check_labels(self, labels: Integers) -> None:
+        unknown = sorted(set(labels.ravel().tolist()) - self._known)
+        if unknown:
+            names = [str(LABELS[i]) if i < len(LABELS) else str(i) for i in unknown]
+            raise InputError(
+                f"The generator was not trained on {', '.join(names)}; "
+                f"it was on {', '.join(self.generator.config.labels)}."
+            )
+
+
+def load_motion_model(tokenizer: Path, generator: Path, robot: str) -> MotionModel:
+    """Reads both weights files.
+
+    Raises:
+        InputError: if one is missing or damaged, or they do not belong together.
+    """
+    return MotionModel(load_tokenizer(tokenizer), load_generator(generator), robot)
+
+
+def _velocities(q: Array) -> Array:
+    """Returns central differences (B, T - 2, 18) of q (B, T, 19)."""
+    turning = quat_error(q[:, :-2, :4], q[:, 2:, :4])
+    moving = q[:, 2:, 4:] - q[:, :-2, 4:]
+    return np.concatenate((turning, moving), axis=-1) * (FPS / 2)
+
+
+def _compose(a: Array, b: Array) -> Array:
+    """Returns the pose b, given relative to a, in the frame of a; shapes (B, 3)."""
+    cos, sin = np.cos(a[:, 2]), np.sin(a[:, 2])
+    x = a[:, 0] + cos * b[:, 0] - sin * b[:, 1]
+    y = a[:, 1] + sin * b[:, 0] + cos * b[:, 1]
+    return np.stack((x, y, a[:, 2] + b[:, 2]), axis=-1)
+
+
+def _inverse(a: Array) -> Array:
+    """Returns the inverse of plane poses (B, 3)."""
+    cos, sin = np.cos(a[:, 2]), np.sin(a[:, 2])
+    x = -cos * a[:, 0] - sin * a[:, 1]
+    y = sin * a[:, 0] - cos * a[:, 1]
+    return np.stack((x, y, -a[:, 2]), axis=-1)

@@ -1,0 +1,192 @@
+"""Motion features to tokens and back: a causal VQ-VAE with residual codebooks.
+
+van den Oord et al. 2017 (VQ-VAE); Zeghidour et al. 2021 (residual quantization,
+codebooks by exponential moving averages, dead codes taken from the batch).
+"""
+
+import math
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from vector_quantize_pytorch import ResidualVQ
+
+from loco_drake.errors import InputError
+from loco_drake.generation.features import CONTACTS, SIZE
+from loco_drake.generation.layers import ConvBlock
+from loco_drake.weights import load_into, load_weights, save_weights
+
+
+@dataclass(frozen=True)
+class TokenizerConfig:
+    """What is needed to build a :class:`Tokenizer`.
+
+    Attributes:
+        robots: the robots whose motion it knows; encoder and decoder are told which.
+        frames_per_token: down-sampling.
+        width: channels of the hidden layers at the rate of tokens.
+        depth: residual blocks at that rate, in encoder and decoder each.
+        frame_width: channels of the decoder's layers at the rate of frames.
+        code_size: dimension of a code.
+        books: residual codebooks; a token is one code of each.
+        book_size: codes in a book.
+    """
+
+    robots: tuple[str, ...] = ("go2",)
+    frames_per_token: int = 4
+    width: int = 128
+    depth: int = 3
+    frame_width: int = 48
+    code_size: int = 32
+    books: int = 4
+    book_size: int = 128
+
+
+class Tokenizer(nn.Module):
+    """The VQ-VAE: encoder, residual quantizer, decoder, feature statistics.
+
+    Times of a token are ``frames_per_token`` frames. Encoder and decoder are causal:
+    the codes of a token depend on no later frame, and frames on no later token.
+
+    Args:
+        config: its sizes.
+    """
+
+    def __init__(self, config: TokenizerConfig) -> None:
+        super().__init__()
+        self.config = config
+        width, frames = config.width, config.frames_per_token
+        self.register_buffer("mean", torch.zeros(SIZE))
+        self.register_buffer("std", torch.ones(SIZE))
+        self.mean: Tensor
+        self.std: Tensor
+        self.encoder_robot = nn.Embedding(len(config.robots), width)
+        self.decoder_robot = nn.Embedding(len(config.robots), width)
+        # The frames of a token are put side by side, so that most of the work is
+        # done at the low rate.
+        self.encoder_in = nn.Linear(SIZE * frames, width)
+        self.encoder = nn.Sequential(*(ConvBlock(width) for _ in range(config.depth)))
+        self.encoder_out = nn.Linear(width, config.code_size)
+        self.quantizer = ResidualVQ(
+            dim=config.code_size,
+            num_quantizers=config.books,
+            codebook_size=config.book_size,
+            kmeans_init=True,
+            kmeans_iters=20,
+            decay=0.98,
+            threshold_ema_dead_code=1,
+            commitment_weight=1.0,
+        )
+        self.decoder_in = nn.Linear(config.code_size, width)
+        self.decoder = nn.Sequential(*(ConvBlock(width) for _ in range(config.depth)))
+        self.expand = nn.Linear(width, frames * config.frame_width)
+        self.smooth = nn.Sequential(
+            *(ConvBlock(config.frame_width, kernel=5) for _ in range(2))
+        )
+        self.decoder_out = nn.Linear(config.frame_width, SIZE)
+
+    @property
+    def memory(self) -> int:
+        """How many earlier tokens the frames of a token can depend on."""
+        tokens = sum(block.reach for block in self.decoder)
+        frames = sum(block.reach for block in self.smooth)
+        return int(tokens + math.ceil(frames / self.config.frames_per_token))
+
+    def set_statistics(self, features: Tensor) -> None:
+        """Takes mean and spread of the features (N, SIZE) for normalization."""
+        self.mean.copy_(features.mean(dim=0))
+        # A feature that hardly varies must not become the loudest of all.
+        self.std.copy_(features.std(dim=0).clamp(min=0.02))
+        self.mean[CONTACTS], self.std[CONTACTS] = 0.5, 0.5
+
+    def embed(self, features: Tensor, robot: Tensor) -> Tensor:
+        """Returns what the quantizer is given: (B, T, SIZE) -> (B, T / f, code_size).
+
+        Args:
+            features: frames; T must be a multiple of ``frames_per_token``.
+            robot: index into ``config.robots``, shape (B,).
+        """
+        batch, frames, _ = features.shape
+        x = (features - self.mean) / self.std
+        x = x.view(batch, frames // self.config.frames_per_token, -1)
+        x = self.encoder_in(x) + self.encoder_robot(robot)[:, None]
+        out: Tensor = self.encoder_out(self.encoder(x))
+        return out
+
+    def encode(self, features: Tensor, robot: Tensor) -> Tensor:
+        """Returns codes (B, T / frames_per_token, books); see :meth:`embed`."""
+        _, codes, _ = self.quantizer(self.embed(features, robot))
+        indices: Tensor = codes
+        return indices
+
+    def decode(self, codes: Tensor, robot: Tensor) -> Tensor:
+        """Returns features (B, n * frames_per_token, SIZE), contacts as probabilities.
+
+        Args:
+            codes: shape (B, n, books).
+            robot: index into ``config.robots``, shape (B,).
+        """
+        features = self.decode_embedded(self.lookup(codes), robot)
+        contacts = features[..., CONTACTS].sigmoid()
+        return torch.cat((features[..., : CONTACTS.start], contacts), dim=-1)
+
+    def lookup(self, codes: Tensor) -> Tensor:
+        """Returns the sum of the books' vectors: (B, n, books) -> (B, n, code_size)."""
+        books = self.quantizer.codebooks  # (books, book_size, code_size)
+        index = torch.arange(len(books))
+        total: Tensor = books[index, codes].sum(dim=-2)
+        return total
+
+    def decode_embedded(self, embedded: Tensor, robot: Tensor) -> Tensor:
+        """Decodes vectors (B, n, code_size); contacts come as logits."""
+        x = self.decoder_in(embedded) + self.decoder_robot(robot)[:, None]
+        x = self.expand(self.decoder(x))  # (B, n, frames * frame_width)
+        x = x.view(x.shape[0], -1, self.config.frame_width)
+        x = self.decoder_out(self.smooth(x))
+        # Logits of the contacts are left as they are, the rest back in their units.
+        scaled = x * self.std + self.mean
+        return torch.cat((scaled[..., : CONTACTS.start], x[..., CONTACTS]), dim=-1)
+
+    def forward(self, features: Tensor, robot: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Encodes, quantizes and decodes.
+
+        Returns:
+            Reconstruction with contacts as logits, codes, commitment loss.
+        """
+        embedded, codes, commitment = self.quantizer(self.embed(features, robot))
+        return self.decode_embedded(embedded, robot), codes, commitment.mean()
+
+    @property
+    def fingerprint(self) -> str:
+        """Short name of exactly these weights in 16 bits, as they are shipped."""
+        digest = sha256(repr(self.config).encode())
+        for name, value in sorted(self.state_dict().items()):
+            data = value.half() if value.is_floating_point() else value
+            digest.update(name.encode() + data.contiguous().numpy().tobytes())
+        return digest.hexdigest()[:16]
+
+
+def save_tokenizer(tokenizer: Tokenizer, path: Path, info: dict[str, Any]) -> None:
+    """Writes weights in 16 bits; ``info`` is added to the header for people."""
+    config = {"network": asdict(tokenizer.config), "info": info}
+    save_weights(path, "tokenizer", tokenizer.state_dict(), config, half=True)
+
+
+def load_tokenizer(path: Path) -> Tokenizer:
+    """Reads a tokenizer, ready for inference.
+
+    Raises:
+        InputError: if the file is missing, damaged, or of something else.
+    """
+    tensors, config = load_weights(path, "tokenizer")
+    try:
+        network = dict(config["network"])
+        network["robots"] = tuple(network["robots"])
+        tokenizer = Tokenizer(TokenizerConfig(**network))
+    except (KeyError, TypeError, ValueError):
+        raise InputError(f"{path} has a damaged tokenizer header.") from None
+    load_into(tokenizer, tensors, path)
+    return tokenizer.eval().requires_grad_(False)

@@ -1,0 +1,171 @@
+"""Training of the generator on the tokens of clips."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn import functional
+
+from loco_drake.errors import InputError
+from loco_drake.generation.determinism import single_thread
+from loco_drake.generation.generator import (
+    LONGEST,
+    Generator,
+    GeneratorConfig,
+    duration_bin,
+    save_generator,
+)
+from loco_drake.generation.library import Clip, Library, Sampler
+from loco_drake.generation.tokenizer import Tokenizer
+from loco_drake.generation.train_tokenizer import clip_tensor
+from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.motion import FPS
+
+BATCH = 32  # windows
+GROWTH = 12  # tokens by which a window grows while a chunk is written
+NO_HISTORY = 0.15  # share of windows that begin a sequence
+CORRUPTION = 0.1  # share of input codes replaced, so that mistakes can be mended
+IGNORE = -100  # what cross-entropy skips
+
+
+@dataclass(frozen=True, eq=False)
+class Codes:
+    """The tokens of one clip, from one of the first frames on.
+
+    Attributes:
+        clip: of which.
+        codes: shape (n, books).
+    """
+
+    clip: Clip
+    codes: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+
+def encode_clips(tokenizer: Tokenizer, clips: Sequence[Clip]) -> list[Codes]:
+    """Returns the tokens of each clip, begun at each of a token's frames.
+
+    So a clip gives as many sequences as a token has frames: the same motion, cut
+    elsewhere.
+    """
+    encoded = []
+    for clip in clips:
+        robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
+        for start in range(tokenizer.config.frames_per_token):
+            with torch.inference_mode(), single_thread():
+                codes = tokenizer.encode(clip_tensor(tokenizer, clip, start), robot)
+            encoded.append(Codes(clip, codes[0].numpy()))
+    return encoded
+
+
+def train_generator(
+    library: Library,
+    tokenizer: Tokenizer,
+    config: GeneratorConfig,
+    settings: LoopSettings,
+) -> tuple[Generator, LoopResult]:
+    """Trains a generator and writes ``generator.safetensors`` if it was not stopped.
+
+    Raises:
+        InputError: if the tokenizer does not know a robot of the library.
+    """
+    missing = sorted(set(library.robots) - set(tokenizer.config.robots))
+    if missing:
+        known = ", ".join(tokenizer.config.robots)
+        raise InputError(f"The tokenizer knows {known}, not {', '.join(missing)}.")
+    encoded = encode_clips(tokenizer, library.train)
+    sampler = Sampler([codes.clip for codes in encoded])
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(settings.seed)
+        generator = Generator(config)
+
+    def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
+        chosen = [encoded[i] for i in sampler(random, BATCH)]
+        loss = generator_loss(generator, *make_batch(config, chosen, random))
+        return loss, {}
+
+    run = {"network": asdict(config), "corruption": CORRUPTION}
+    result = train("generator", generator, loss_of_batch, settings, run)
+    if not result.stopped:
+        info = {"robots": list(library.robots)}
+        save_generator(generator, Path(settings.out) / "generator.safetensors", info)
+    return generator, result
+
+
+def make_batch(
+    config: GeneratorConfig, chosen: Sequence[Codes], random: np.random.Generator
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Cuts a window out of each sequence, at random.
+
+    The duration that a window is told is drawn too: any stretch of a gait is also
+    one of a longer performance.
+
+    Returns:
+        before, labels, duration and codes as :meth:`Generator.forward` takes them;
+        codes past the end of a sequence are IGNORE.
+    """
+    length = config.window + GROWTH
+    batch = len(chosen)
+    before = np.zeros((batch, length, config.books), dtype=np.int64)
+    codes = np.full((batch, length, config.books), IGNORE, dtype=np.int64)
+    labels = np.zeros((batch, length), dtype=np.int64)
+    seconds = np.empty(batch)
+    for i, sequence in enumerate(chosen):
+        # The token before the window is its history; a sequence's first has none.
+        start = random.integers(-1, max(len(sequence) - length, len(sequence) // 2))
+        window = sequence.codes[max(start, 0) : start + 1 + length]
+        if start < 0 or random.random() < NO_HISTORY:
+            first = np.full((1, config.books), config.book_size)
+            window = np.concatenate((first, window[min(start + 1, 1) :]))
+        n = len(window) - 1
+        before[i, :n], codes[i, :n] = window[:-1], window[1:]
+        labels[i] = sequence.clip.label.index
+        shortest = n * config.frames_per_token / FPS
+        seconds[i] = shortest * (4 * LONGEST / shortest) ** random.random()
+    wrong = random.random(before.shape) < CORRUPTION * random.random((batch, 1, 1)) * 2
+    wrong &= before < config.book_size
+    before[wrong] = random.integers(config.book_size, size=int(wrong.sum()))
+    return (
+        torch.from_numpy(before),
+        torch.from_numpy(labels),
+        torch.from_numpy(duration_bin(seconds)),
+        torch.from_numpy(codes),
+    )
+
+
+def generator_loss(
+    generator: Generator,
+    before: Tensor,
+    labels: Tensor,
+    duration: Tensor,
+    codes: Tensor,
+) -> Tensor:
+    """Returns the mean cross-entropy in nats a code; see :meth:`Generator.forward`."""
+    logits = generator(before, labels, duration, codes.clamp(min=0))
+    return functional.cross_entropy(
+        logits.flatten(0, 2), codes.flatten(), ignore_index=IGNORE
+    )
+
+
+def score_generator(
+    generator: Generator, tokenizer: Tokenizer, clips: Sequence[Clip]
+) -> float:
+    """Returns the cross-entropy of whole clips in nats a code."""
+    total, count = 0.0, 0
+    config = generator.config
+    for sequence in encode_clips(tokenizer, clips):
+        codes = torch.from_numpy(sequence.codes)[None]
+        first = torch.full((1, 1, config.books), config.book_size)
+        labels = torch.full(codes.shape[:2], sequence.clip.label.index)
+        duration = torch.from_numpy(duration_bin(np.array([LONGEST])))
+        before = torch.cat((first, codes[:, :-1]), dim=1)
+        with torch.inference_mode(), single_thread():
+            loss = generator_loss(generator, before, labels, duration, codes)
+        total, count = total + float(loss) * codes.numel(), count + codes.numel()
+    return total / max(count, 1)

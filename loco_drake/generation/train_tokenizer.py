@@ -1,0 +1,163 @@
+"""Training of the tokenizer on windows of clips, and its score."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from loco_drake.errors import InputError
+from loco_drake.generation.determinism import single_thread
+from loco_drake.generation.features import CONTACTS, JOINTS
+from loco_drake.generation.library import Clip, Library, Sampler
+from loco_drake.generation.toes import Toes
+from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
+from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.models.robots import get_robot
+
+WINDOW = 64  # frames
+BATCH = 32  # windows
+
+# Weights of the losses; each is scaled to be about 1 before training.
+WEIGHTS = {
+    "features": 1.0,  # squared error in standard deviations
+    "speeds": 0.5,  # ... of its change from frame to frame
+    "toes": 1.0,  # squared error of toe positions, in units of TOE_SCALE
+    "toe_speeds": 0.5,  # ... of their velocities over the ground, TOE_SPEED_SCALE
+    "contacts": 0.2,  # cross-entropy
+    "commitment": 0.25,
+}
+TOE_SCALE = 0.05  # m
+TOE_SPEED_SCALE = 0.5  # m/s
+
+
+@dataclass(frozen=True)
+class TokenizerScore:
+    """How well a tokenizer gives back what it was given.
+
+    Attributes:
+        joint_rmse_rad: over frames and joints.
+        toe_error_rmse_m: Euclidean distance of the toe spheres' centres, relative to
+            the ground under the trunk, over frames and toes.
+        codebook_use: share of the codes of all books that occur.
+    """
+
+    joint_rmse_rad: float
+    toe_error_rmse_m: float
+    codebook_use: float
+
+
+def train_tokenizer(
+    library: Library, config: TokenizerConfig, settings: LoopSettings
+) -> tuple[Tokenizer, LoopResult]:
+    """Trains a tokenizer and writes ``tokenizer.safetensors`` if it was not stopped.
+
+    Raises:
+        InputError: if no clip is as long as a window, or a robot of the library is
+            not in the config.
+    """
+    clips = [clip for clip in library.train if len(clip) >= WINDOW]
+    if not clips:
+        raise InputError(f"No motion to train on is at least {WINDOW} frames long.")
+    missing = sorted(set(library.robots) - set(config.robots))
+    if missing:
+        raise InputError(f"The tokenizer is not to know {', '.join(missing)}.")
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(settings.seed)
+        tokenizer = Tokenizer(config)
+    frames = np.concatenate([clip.features for clip in clips])
+    tokenizer.set_statistics(torch.tensor(frames, dtype=torch.float32))
+    toes = Toes([get_robot(name) for name in config.robots])
+    sampler = Sampler(clips)
+
+    def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
+        chosen = [clips[i] for i in sampler(random, BATCH)]
+        starts = [random.integers(len(clip) - WINDOW + 1) for clip in chosen]
+        windows = [
+            clip.features[start : start + WINDOW]
+            for clip, start in zip(chosen, starts, strict=True)
+        ]
+        target = torch.tensor(np.stack(windows), dtype=torch.float32)
+        robot = torch.tensor([config.robots.index(clip.robot) for clip in chosen])
+        losses = tokenizer_losses(tokenizer, toes, target, robot)
+        total = sum(
+            (WEIGHTS[name] * loss for name, loss in losses.items()), torch.zeros(())
+        )
+        return total, {name: loss.item() for name, loss in losses.items()}
+
+    run = {"network": asdict(config), "weights": WEIGHTS}
+    result = train("tokenizer", tokenizer, loss_of_batch, settings, run)
+    if not result.stopped:
+        info = {"labels": [str(label) for label in library.labels]}
+        save_tokenizer(tokenizer, Path(settings.out) / "tokenizer.safetensors", info)
+    return tokenizer, result
+
+
+def tokenizer_losses(
+    tokenizer: Tokenizer, toes: Toes, target: Tensor, robot: Tensor
+) -> dict[str, Tensor]:
+    """Returns the losses of a batch, unweighted; see :data:`WEIGHTS`.
+
+    Args:
+        tokenizer: in training mode its codebooks are updated.
+        toes: of the tokenizer's robots.
+        target: features, shape (B, T, SIZE).
+        robot: index of each window's robot, shape (B,).
+    """
+    output, _, commitment = tokenizer(target, robot)
+    contacts = output[..., CONTACTS]
+    error = ((output - target) / tokenizer.std)[..., : CONTACTS.start]
+    p_target = toes.positions(target, robot)
+    p_output = toes.positions(output, robot)
+    v_target = toes.velocities(target, p_target, robot)
+    v_output = toes.velocities(output, p_output, robot)
+    return {
+        "features": error.square().mean(),
+        "speeds": error.diff(dim=1).square().mean() * 10,
+        "toes": ((p_output - p_target) / TOE_SCALE).square().mean(),
+        "toe_speeds": ((v_output - v_target) / TOE_SPEED_SCALE).square().mean(),
+        "contacts": functional.binary_cross_entropy_with_logits(
+            contacts, target[..., CONTACTS]
+        ),
+        "commitment": commitment,
+    }
+
+
+def score_tokenizer(tokenizer: Tokenizer, clips: Sequence[Clip]) -> TokenizerScore:
+    """Returns how well whole clips survive the way to tokens and back."""
+    toes = Toes([get_robot(name) for name in tokenizer.config.robots])
+    joints, distances = [], []
+    for clip in clips:
+        target = clip_tensor(tokenizer, clip)
+        robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
+        with torch.inference_mode(), single_thread():
+            output = tokenizer.decode(tokenizer.encode(target, robot), robot)
+            apart = toes.positions(output, robot) - toes.positions(target, robot)
+        joints.append((output - target)[..., JOINTS].square().flatten())
+        distances.append(apart.square().sum(dim=-1).flatten())
+    return TokenizerScore(
+        joint_rmse_rad=float(torch.cat(joints).mean().sqrt()),
+        toe_error_rmse_m=float(torch.cat(distances).mean().sqrt()),
+        codebook_use=codebook_use(tokenizer, clips),
+    )
+
+
+def codebook_use(tokenizer: Tokenizer, clips: Sequence[Clip]) -> float:
+    """Returns the share of all books' codes that the clips need, in [0, 1]."""
+    used = torch.zeros(tokenizer.config.books, tokenizer.config.book_size)
+    for clip in clips:
+        robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
+        with torch.inference_mode(), single_thread():
+            codes = tokenizer.encode(clip_tensor(tokenizer, clip), robot)[0]
+        used[torch.arange(tokenizer.config.books), codes] = 1.0
+    return float(used.mean())
+
+
+def clip_tensor(tokenizer: Tokenizer, clip: Clip, start: int = 0) -> Tensor:
+    """Returns a clip's features from ``start`` on, in whole tokens, (1, T, SIZE)."""
+    tokens = (len(clip) - start) // tokenizer.config.frames_per_token
+    end = start + tokens * tokenizer.config.frames_per_token
+    return torch.tensor(clip.features[None, start:end], dtype=torch.float32)
