@@ -44,6 +44,8 @@ class Robot:
         joint_speed_limits: rad/s, shape (12,).
         effort_limits: Nm at the joint, shape (12,).
         reflected_inertia: of the rotors as seen at the joint, kg m^2, shape (12,).
+        joint_inertia: about each joint with the others locked, in the usual stance,
+            reflected inertia included, kg m^2, shape (12,).
         kp: stiffness of the PD in the plant, Nm/rad, shape (12,).
         kd: damping of the PD in the plant, Nm s/rad, shape (12,).
         mass: of the whole robot, kg.
@@ -67,6 +69,7 @@ class Robot:
     joint_speed_limits: Array
     effort_limits: Array
     reflected_inertia: Array
+    joint_inertia: Array
     kp: Array
     kd: Array
     mass: float
@@ -169,6 +172,8 @@ def get_robot(name: str) -> Robot:
     plant.SetPositions(context, [1.0, *[0.0] * 6, *stand_joints])
     lowest = _origins(plant, context, [f"{leg}_foot" for leg in LEGS])[:, 2].min()
 
+    joint_inertia = np.diag(plant.CalcMassMatrix(context))[6:]
+
     return Robot(
         name=name,
         url=url,
@@ -180,6 +185,7 @@ def get_robot(name: str) -> Robot:
         reflected_inertia=np.array(
             [a.default_rotor_inertia() * a.default_gear_ratio() ** 2 for a in actuators]
         ),
+        joint_inertia=joint_inertia.copy(),
         kp=np.array([gain.p for gain in gains]),
         kd=np.array([gain.d for gain in gains]),
         mass=float(plant.CalcTotalMass(context)),

@@ -28,11 +28,12 @@ class JointTargets(LeafSystem):
 
     Every PLAN_DT it samples its inputs and sets
 
-        q_d = q_ref(t + PLAN_DT) + ACTION_SCALE * action + (kd / kp) v_ref(t + PLAN_DT).
+        q_d = q_ref + ACTION_SCALE * action + (kd v_ref + tau_ref) / kp
 
-    The desired velocity is folded into the position and sent as zero, since Drake's
-    CENIC integrator (1.51) takes desired velocities with the wrong sign; the torque
-    kp (q_d - q) - kd v is the same. The sampling is an unrestricted update, which Drake
+    with the plan's positions, velocities and feed-forward torques at t + PLAN_DT. All
+    act through the position: the desired velocity is sent as zero, since Drake's CENIC
+    integrator (1.51) takes it with the wrong sign; the torque kp (q_d - q) - kd v is
+    the same either way. The sampling is an unrestricted update, which Drake
     performs before the plant's discrete update at the same time: the action reaches
     the joints without delay. The output ``action`` is the one being held.
     """
@@ -40,7 +41,7 @@ class JointTargets(LeafSystem):
     def __init__(self, robot: Robot) -> None:
         super().__init__()
         self._size = len(robot.joint_names)
-        self._velocity_gain = robot.kd / robot.kp
+        self._kp, self._kd = robot.kp, robot.kd
         self._plan = self.DeclareAbstractInputPort("plan", Value(standing_plan(robot)))
         self._action = self.DeclareVectorInputPort("action", self._size)
         self._held = self.DeclareDiscreteState(
@@ -64,9 +65,8 @@ class JointTargets(LeafSystem):
         plan = self._plan.Eval(context)
         action = self._action.Eval(context)
         k = plan.index(context.get_time() + PLAN_DT)
-        targets = (
-            plan.q[k, 7:] + ACTION_SCALE * action + self._velocity_gain * plan.v[k, 6:]
-        )
+        feed_forward = (self._kd * plan.v[k, 6:] + plan.torques[k]) / self._kp
+        targets = plan.q[k, 7:] + ACTION_SCALE * action + feed_forward
         held = state.get_mutable_discrete_state(int(self._held))
         held.set_value(np.concatenate((action, targets)))
         return EventStatus.Succeeded()

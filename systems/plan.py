@@ -12,10 +12,12 @@ from loco_drake.models.robots import Robot
 from loco_drake.motion import FPS, Motion
 from loco_drake.rotations import quat_conjugate, quat_rotate, yaw_of, yaw_quat
 
+from .feed_forward import feed_forward_torques
+
 Array = NDArray[np.float64]
 
 PLAN_DT = 1.0 / FPS
-_ARRAYS = ("q", "v", "p_WF", "contacts", "labels", "path_time")
+_ARRAYS = ("q", "v", "torques", "p_WF", "contacts", "labels", "path_time")
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +35,7 @@ class Plan:
         start_time: context time in s of the first sample.
         q: positions, shape (N, 7 + J).
         v: velocities, shape (N, 6 + J).
+        torques: feed-forward of the joints in Nm, shape (N, J).
         p_WF: centres of the toe spheres in m, shape (N, 4, 3).
         contacts: whether each foot is meant to be on the ground, shape (N, 4).
         labels: index into :data:`loco_drake.gaits.LABELS`, shape (N,).
@@ -44,6 +47,7 @@ class Plan:
     start_time: float
     q: Array
     v: Array
+    torques: Array
     p_WF: Array
     contacts: NDArray[np.bool_]
     labels: NDArray[np.int64]
@@ -104,12 +108,13 @@ def make_plan(
     path_time: Array | None = None,
     open_ended: bool = False,
 ) -> Plan:
-    """Returns a Plan, its toes computed from ``q`` by the robot's kinematics."""
+    """Returns a Plan; toes and feed-forward torques follow from the robot's model."""
     p_BF = toe_positions(robot, q[:, 7:])
     p_WF = q[:, None, 4:7] + quat_rotate(q[:, None, :4], p_BF)
     written = PLAN_DT * np.arange(len(q), dtype=np.float64)
     times = written if path_time is None else path_time
-    return Plan(start_time, q, v, p_WF, contacts, labels, times, open_ended)
+    torques = feed_forward_torques(robot, q, v, contacts)
+    return Plan(start_time, q, v, torques, p_WF, contacts, labels, times, open_ended)
 
 
 def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> Plan:

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import toppra
 from numpy.typing import NDArray
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import MultibodyPlant
 from scipy.interpolate import CubicSpline
 from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 from toppra.interpolator import AbstractGeometricPath
 
-from loco_drake.models.robots import AddRobotModel, Robot
+from loco_drake.models.robots import Robot
 
 from .plan import PLAN_DT
 
@@ -41,18 +39,13 @@ class JointLimits:
 def joint_limits(robot: Robot) -> JointLimits:
     """Returns the robot's limits on joint speed and acceleration.
 
-    The acceleration that a joint can give its leg is ``effort_limit / M_jj``, with
-    M_jj the joint-space inertia about that joint in the standing pose, the rotor's
-    reflected inertia included: an upper bound for a leg in swing, where fast joint
+    The acceleration that a joint can give its leg is ``effort_limit /
+    joint_inertia``: an upper bound for a leg in swing, where fast joint
     motion happens. A leg in stance also carries load, but hardly accelerates.
     """
-    plant = MultibodyPlant(0.0)
-    AddRobotModel(Parser(plant), robot.name, visual=False)
-    plant.Finalize()
-    context = plant.CreateDefaultContext()
-    plant.SetPositions(context, [1.0, *[0.0] * 6, *robot.stand_joints])
-    inertia = np.diag(plant.CalcMassMatrix(context))[-len(robot.joint_names) :]
-    return JointLimits(robot.joint_speed_limits, robot.effort_limits / inertia)
+    return JointLimits(
+        robot.joint_speed_limits, robot.effort_limits / robot.joint_inertia
+    )
 
 
 class _JointPath(AbstractGeometricPath):

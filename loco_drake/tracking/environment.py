@@ -66,8 +66,8 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
     :class:`loco_drake.systems.joint_targets.JointTargets`, rewards the sum of
     :func:`loco_drake.systems.tracking_reward.reward_terms`, at most 1 a step. An
     episode starts in a state of the plan (reference state initialization, Peng et al.
-    2018), terminates when the robot falls or loses its plan and is truncated when its time or
-    its plan is over.
+    2018), terminates when the robot falls or loses its plan, and is truncated when its
+    time or its plan is over.
 
     ``info`` holds the reward's terms by name, and the plan and sample that the episode
     started at. ``reset(options={"plan": i, "sample": k})`` chooses them.
