@@ -1,10 +1,12 @@
 """What commands print for people and write for programs."""
 
 import json
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -22,13 +24,13 @@ def print_table(
     title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]
 ) -> None:
     """Prints a table to stdout; the first column is text, the others are numbers."""
-    table = Table(title=title, title_justify="left")
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     for index, column in enumerate(columns):
+        first = index == 0
         table.add_column(
-            column, justify="right" if index else "left", no_wrap=index == 0
+            column, justify="left" if first else "right", no_wrap=first, overflow="fold"
         )
     for row in rows:
         table.add_row(*row)
-    console = Console()
     # Rich takes a file or a pipe for a terminal of 80 columns.
-    console.print(table, width=None if console.is_terminal else 160)
+    Console(width=None if sys.stdout.isatty() else 160).print(table)

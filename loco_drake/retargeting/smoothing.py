@@ -12,7 +12,9 @@ ORDER = 3
 
 def difference_matrix(frames: int) -> csc_matrix:
     """Returns D, shape (frames - 3, frames), of third differences."""
-    rows = max(frames - ORDER, 0)
+    rows = frames - ORDER
+    if rows <= 0:
+        return csc_matrix((0, frames))
     stencil = (-1.0, 3.0, -3.0, 1.0)
     return csc_matrix(
         diags_array(stencil, offsets=range(ORDER + 1), shape=(rows, frames))

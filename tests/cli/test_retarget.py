@@ -1,0 +1,88 @@
+import json
+
+import pytest
+import tyro
+
+from loco_drake.cli.retarget import Retarget
+from loco_drake.errors import InputError
+from loco_drake.motion import load_motion
+
+KEYS = {
+    "frames",
+    "frames_per_second",
+    "toe_error_rmse_m",
+    "stance_slip_median_mps",
+    "penetration_max_m",
+    "joint_limit_violations",
+    "joint_speed_ratio_max",
+    "correction_rmse_m",
+}
+
+
+def command(*arguments):
+    return tyro.cli(Retarget, args=[str(argument) for argument in arguments])
+
+
+def test_batch_writes_motions_json_and_table(made_data, tmp_path, capsys):
+    arguments = ("--data-dir", made_data, "--out", tmp_path / "out")
+    choice = ("--gait", "pace", "--gait", "trot", "--json", tmp_path / "a.json")
+    assert command(*arguments, *choice).run() == 0
+    figures = json.loads((tmp_path / "a.json").read_text())
+    names = ["dog-pace-made_pace-0-240", "dog-trot-made_trot-0-240"]
+    assert list(figures) == names
+    for name in names:
+        assert set(figures[name]) >= KEYS
+        motion = load_motion(tmp_path / "out" / f"{name}.npz")
+        assert len(motion) == figures[name]["frames"] == 200
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in names)
+
+
+def test_one_file_with_a_stretch_for_the_a1(made_data, tmp_path):
+    file = made_data / "dog_mann" / "keypoints" / "made_trot.txt"
+    options = ("--source", "dog", "--gait", "trot", "--robot", "a1", "--start", 60)
+    assert command(file, *options, "--end", 180, "--out", tmp_path).run() == 0
+    motion = load_motion(tmp_path / "dog-trot-made_trot-60-180.npz")
+    assert motion.robot == "a1"
+    assert len(motion) == 100  # 119 steps of 1/60 s are 99.2 of 20 ms
+
+
+def test_bad_clip_in_a_batch_is_reported_with_status_1(made_data, tmp_path, capsys):
+    table = (made_data / "segments.csv").read_text()
+    (tmp_path / "dog_mann").symlink_to(made_data / "dog_mann")
+    extra = "dog_mann,keypoints/made_pace.txt,pace,0,9999,60,1,\n"
+    (tmp_path / "segments.csv").write_text(table + extra)
+    options = ("--data-dir", tmp_path, "--gait", "pace", "--out", tmp_path / "out")
+    assert command(*options, "--json", tmp_path / "a.json").run() == 1
+    message = capsys.readouterr().err
+    assert "Failed: dog-pace-made_pace-0-9999: Frames 0 to 9999" in message
+    figures = json.loads((tmp_path / "a.json").read_text())
+    assert "error" in figures["dog-pace-made_pace-0-9999"]
+    assert (tmp_path / "out" / "dog-pace-made_pace-0-240.npz").is_file()
+
+
+def test_wrong_input_raises_one_sentence(made_data, tmp_path):
+    data = ("--data-dir", made_data, "--out", tmp_path)
+    file = made_data / "dog_mann" / "keypoints" / "made_trot.txt"
+    wrong = {
+        ("--robot", "spot", *data): "'spot'; the choices are go2, a1",
+        ("--gait", "fly", *data): "'fly' of any source; the choices are pace",
+        ("--start", "3", *data): "need a FILE",
+        (file, "--gait", "trot"): "needs its --source and one --gait",
+        (file, "--source", "cat", "--gait", "trot"): "'cat'; the choices are dog",
+        (tmp_path / "no", "--source", "dog", "--gait", "trot"): "There is no file",
+        ("--data-dir", tmp_path / "no"): "There is no data folder",
+    }
+    for arguments, reason in wrong.items():
+        with pytest.raises(InputError, match=reason):
+            command(*arguments).run()
+
+
+def test_truncated_file_is_wrong_input_and_leaves_nothing_behind(made_data, tmp_path):
+    whole = (made_data / "dog_mann" / "keypoints" / "made_trot.txt").read_text()
+    (tmp_path / "cut.txt").write_text(whole[:-100])
+    out = tmp_path / "out"
+    options = ("--source", "dog", "--gait", "trot", "--out", out)
+    with pytest.raises(InputError, match="cut off"):
+        command(tmp_path / "cut.txt", *options).run()
+    assert not out.exists()

@@ -1,0 +1,24 @@
+"""Fixtures for all tests."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.synthetic import write_data_folder
+
+
+@pytest.fixture(scope="session")
+def real_data() -> Path:
+    """The folder of the real recordings; without one the test is skipped."""
+    folder = os.environ.get("LOCO_DRAKE_DATA")
+    if not folder or not Path(folder).is_dir():
+        pytest.skip("needs real recordings: LOCO_DRAKE_DATA names no folder")
+    return Path(folder)
+
+
+@pytest.fixture(scope="session")
+def made_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data folder with made recordings of a dog: pace, trot and gallop, 4 s each."""
+    folder = tmp_path_factory.mktemp("made_data")
+    return write_data_folder(folder, gaits=("pace", "trot", "gallop"))
