@@ -30,11 +30,11 @@ def trot_joints(
 ) -> Array:
     """Returns joint targets of a trot, to be sent to the PD with v_d = 0.
 
-    In stance a toe moves straight back at ``speed``, in swing it returns along a cosine,
-    lifted by a sine squared. Strides grow over the first half second. The targets lead
-    the toes' path by what makes the PD give the torque that carries the weight, J' f / kp,
-    and by what its damping would hold back, (kd / kp) v: without that a trot sinks and
-    stumbles, and which way it stumbles says little about contact.
+    In stance a toe moves straight back at ``speed``; in swing it returns along a
+    cosine, lifted by a sine squared. Strides grow over the first half second. The
+    targets lead the toes' path by what makes the PD give the torque that carries the
+    weight, J' f / kp, and by what its damping would hold back, (kd / kp) v: without
+    that a trot sinks and stumbles, and how it stumbles says little about contact.
 
     Args:
         robot: who trots.
