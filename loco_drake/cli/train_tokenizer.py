@@ -66,19 +66,16 @@ class TrainTokenizer:
             "wall_clock_s": time.perf_counter() - start,
             "codebook_use": codebook_use(tokenizer, library.train + library.held_out),
         }
+        rows = []
         for name, clips in (("train", library.train), ("held_out", library.held_out)):
             if clips:
-                score = asdict(score_tokenizer(tokenizer, clips))
-                del score["codebook_use"]
-                figures[name] = score
+                score = score_tokenizer(tokenizer, clips)
+                figures[name] = asdict(score)
+                toes = f"{score.toe_error_rmse_m * 1000:.1f}"
+                rows.append(
+                    [name.replace("_", " "), f"{score.joint_rmse_rad:.4f}", toes]
+                )
         write_json(self.json, figures)
-        rows = []
-        for name in ("train", "held_out"):
-            score = figures.get(name)
-            if isinstance(score, dict):
-                degrees = f"{score['joint_rmse_rad']:.4f}"
-                toes = f"{score['toe_error_rmse_m'] * 1000:.1f}"
-                rows.append([name.replace("_", " "), degrees, toes])
         print_table(
             f"{self.out / 'tokenizer.safetensors'}: {figures['codebook_use']:.0%} of "
             f"the codes are used",

@@ -22,6 +22,7 @@ def check_steps(steps: int, learning_rate: float, held_out: float) -> None:
 def print_stopped(done: int, steps: int) -> int:
     """Says on stderr how to go on; returns the exit status of unfinished work."""
     Console(stderr=True, highlight=False).print(
-        f"Stopped after {done} of {steps} steps; the same command with --resume goes on."
+        f"Stopped after {done} of {steps} steps; "
+        "the same command with --resume goes on."
     )
     return 1

@@ -14,7 +14,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
-from torch.nn import functional
 
 from loco_drake.errors import InputError
 from loco_drake.gaits import ONE_HOT, ONE_HOT_SIZE

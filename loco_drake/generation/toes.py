@@ -43,7 +43,7 @@ class Toes(nn.Module):
             features: shape (B, T, SIZE).
             robot: index of each sequence's robot, shape (B,).
         """
-        hip, thigh, calf = features[..., JOINTS].unflatten(-1, (4, 3)).unbind(-1)
+        hip, thigh, calf = self._legs(features).unbind(-1)
         l1, l2 = self.thigh[robot, None, None], self.calf[robot, None, None]
         side = self.offset[robot][:, None]  # (B, 1, 4)
         forward = -l1 * thigh.sin() - l2 * (thigh + calf).sin()
@@ -69,9 +69,15 @@ class Toes(nn.Module):
             robot: index of each sequence's robot, shape (B,).
         """
         speed = features[:, 1:, VELOCITY] * self.stand_height[robot, None, None]
-        rate = features[:, 1:, None, YAW_RATE]  # (B, T - 1, 1, 1)
+        rate = features[:, 1:, YAW_RATE]  # (B, T - 1, 1)
         middle = (p_HF[:, 1:] + p_HF[:, :-1]) / 2
-        x, y, _ = middle.split(1, dim=-1)
-        turning = torch.cat((-rate * y, rate * x, torch.zeros_like(x)), dim=-1)
+        x, y, _ = middle.unbind(-1)  # (B, T - 1, 4)
+        turning = torch.stack((-rate * y, rate * x, torch.zeros_like(x)), dim=-1)
         moving = torch.cat((speed, torch.zeros_like(speed[..., :1])), dim=-1)
         return (p_HF[:, 1:] - p_HF[:, :-1]) * FPS + turning + moving[:, :, None]
+
+    @staticmethod
+    def _legs(features: Tensor) -> Tensor:
+        """Returns the joints leg by leg, (..., 4, 3)."""
+        joints = features[..., JOINTS]
+        return joints.reshape(*joints.shape[:-1], 4, 3)

@@ -81,19 +81,16 @@ class Tokenizer(nn.Module):
             commitment_weight=1.0,
         )
         self.decoder_in = nn.Linear(config.code_size, width)
-        self.decoder = nn.Sequential(*(ConvBlock(width) for _ in range(config.depth)))
+        decoder = [ConvBlock(width) for _ in range(config.depth)]
+        smooth = [ConvBlock(config.frame_width, kernel=5) for _ in range(2)]
+        self.decoder = nn.Sequential(*decoder)
         self.expand = nn.Linear(width, frames * config.frame_width)
-        self.smooth = nn.Sequential(
-            *(ConvBlock(config.frame_width, kernel=5) for _ in range(2))
-        )
+        self.smooth = nn.Sequential(*smooth)
         self.decoder_out = nn.Linear(config.frame_width, SIZE)
-
-    @property
-    def memory(self) -> int:
-        """How many earlier tokens the frames of a token can depend on."""
-        tokens = sum(block.reach for block in self.decoder)
-        frames = sum(block.reach for block in self.smooth)
-        return int(tokens + math.ceil(frames / self.config.frames_per_token))
+        # How many earlier tokens the frames of a token can depend on.
+        self.memory = sum(block.reach for block in decoder) + math.ceil(
+            sum(block.reach for block in smooth) / frames
+        )
 
     def set_statistics(self, features: Tensor) -> None:
         """Takes mean and spread of the features (N, SIZE) for normalization."""

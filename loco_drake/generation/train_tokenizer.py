@@ -42,12 +42,10 @@ class TokenizerScore:
         joint_rmse_rad: over frames and joints.
         toe_error_rmse_m: Euclidean distance of the toe spheres' centres, relative to
             the ground under the trunk, over frames and toes.
-        codebook_use: share of the codes of all books that occur.
     """
 
     joint_rmse_rad: float
     toe_error_rmse_m: float
-    codebook_use: float
 
 
 def train_tokenizer(
@@ -141,7 +139,6 @@ def score_tokenizer(tokenizer: Tokenizer, clips: Sequence[Clip]) -> TokenizerSco
     return TokenizerScore(
         joint_rmse_rad=float(torch.cat(joints).mean().sqrt()),
         toe_error_rmse_m=float(torch.cat(distances).mean().sqrt()),
-        codebook_use=codebook_use(tokenizer, clips),
     )
 
 

@@ -1,5 +1,6 @@
 """The loop that trains both networks: resumable, stoppable, logged."""
 
+import json
 import math
 import signal
 import threading
@@ -66,12 +67,12 @@ class LoopResult:
     Attributes:
         steps: optimizer steps taken in all, those before a resume included.
         stopped: whether it was stopped by Ctrl-C before its last step.
-        metrics: the last figures that were logged.
+        loss: of the last batch.
     """
 
     steps: int
     stopped: bool
-    metrics: dict[str, float]
+    loss: float
 
 
 def train(
@@ -100,6 +101,7 @@ def train(
             of another run.
     """
     config = {**config, "steps": settings.steps, "seed": settings.seed}
+    config = json.loads(json.dumps(config))  # as a checkpoint gives it back
     optimizer = torch.optim.AdamW(
         module.parameters(),
         lr=settings.learning_rate,
@@ -118,7 +120,7 @@ def train(
         if settings.resume:
             step = _load(path, kind, module, optimizer, random, config)
         module.train()
-        metrics: dict[str, float] = {}
+        last = math.nan
         with _progress() as progress, _logs(settings.out, step) as logs:
             bar = progress.add_task(name, total=settings.steps, completed=step, note="")
             while step < settings.steps and not stop_requested.is_set():
@@ -128,20 +130,21 @@ def train(
                     )
                 loss, metrics = loss_of_batch(random)
                 optimizer.zero_grad()
-                loss.backward()
+                loss.backward()  # type: ignore[no-untyped-call]
                 nn.utils.clip_grad_norm_(module.parameters(), 1.0)
                 optimizer.step()
                 step += 1
-                progress.update(bar, completed=step, note=f"loss {loss.item():.4f}")
+                last = loss.item()
+                progress.update(bar, completed=step, note=f"loss {last:.4f}")
                 if step % settings.log_every == 0:
-                    logs.add_scalar("loss", loss.item(), step)
+                    logs.add_scalar("loss", last, step)
                     for key, value in metrics.items():
                         logs.add_scalar(key, value, step)
                 if step % settings.checkpoint_every == 0:
                     _save(path, kind, module, optimizer, random, config, step)
         _save(path, kind, module, optimizer, random, config, step)
         module.eval()
-    return LoopResult(step, step < settings.steps, metrics)
+    return LoopResult(step, step < settings.steps, last)
 
 
 def _schedule(progress: float) -> float:

@@ -34,10 +34,11 @@ def test_features_do_not_depend_on_place_and_heading(make_synthetic):
     from loco_drake.rotations import quat_multiply, quat_rotate, yaw_quat
 
     motion = make_synthetic("dog-pace", 2.0, 0.7, 0.4)
-    q_turn = yaw_quat(np.array(2.1))
+    q_turn, shift = yaw_quat(np.array(2.1)), np.array([3.0, -1.0, 0.0])
     moved = replace(
         motion,
-        base_position=quat_rotate(q_turn, motion.base_position) + [3.0, -1.0, 0.0],
+        base_position=quat_rotate(q_turn, motion.base_position)
+        + np.array([3.0, -1.0, 0.0]),
         base_quaternion=quat_multiply(q_turn, motion.base_quaternion),
     )
     np.testing.assert_allclose(

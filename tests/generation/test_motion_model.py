@@ -193,7 +193,7 @@ def test_the_gait_can_change_while_it_runs(model):
 def test_a_label_that_was_not_trained_names_those_that_were(model):
     stream = model.start(np.array([0]))
     with pytest.raises(
-        InputError, match="not trained on horse-walk.*dog-pace, dog-trot"
+        InputError, match=r"not trained on horse-walk.*dog-pace, dog-trot"
     ):
         model.extend(stream, np.array([parse_label("horse-walk").index]))
 

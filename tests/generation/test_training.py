@@ -1,0 +1,172 @@
+import os
+import signal
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from loco_drake.errors import InputError
+from loco_drake.generation.generator import GeneratorConfig, load_generator
+from loco_drake.generation.library import load_library
+from loco_drake.generation.motion_model import MotionModel
+from loco_drake.generation.tokenizer import TokenizerConfig, load_tokenizer
+from loco_drake.generation.train_generator import (
+    IGNORE,
+    encode_clips,
+    make_batch,
+    train_generator,
+)
+from loco_drake.generation.train_tokenizer import score_tokenizer, train_tokenizer
+from loco_drake.generation.training import LoopSettings
+
+TINY = TokenizerConfig(width=24, depth=1, frame_width=8, books=2, book_size=16)
+
+
+@pytest.fixture(scope="module")
+def library(motions):
+    return load_library(motions, held_out_fraction=0.2, seed=0)
+
+
+@pytest.fixture(scope="module")
+def tokenizer(library, tmp_path_factory):
+    out = tmp_path_factory.mktemp("tokenizer")
+    train_tokenizer(library, TINY, LoopSettings(out, 60, 3e-3))
+    return load_tokenizer(out / "tokenizer.safetensors")
+
+
+def generator_config(tokenizer):
+    return GeneratorConfig(
+        tokenizer=tokenizer.fingerprint,
+        books=2,
+        book_size=16,
+        frames_per_token=4,
+        labels=("dog-pace", "dog-trot"),
+        window=8,
+        width=24,
+        layers=1,
+        heads=2,
+    )
+
+
+def same_weights(a, b):
+    a, b = a.state_dict(), b.state_dict()
+    return all(torch.equal(a[name], b[name]) for name in a)
+
+
+def test_training_makes_the_tokenizer_better(library, tokenizer, tmp_path):
+    untrained, _ = train_tokenizer(library, TINY, LoopSettings(tmp_path, 1, 3e-3))
+    before = score_tokenizer(untrained, library.held_out)
+    after = score_tokenizer(tokenizer, library.held_out)
+    assert after.joint_rmse_rad < 0.6 * before.joint_rmse_rad
+    assert after.toe_error_rmse_m < 0.6 * before.toe_error_rmse_m
+
+
+def test_training_makes_the_generator_better(library, tokenizer, tmp_path):
+    """From chance, ln 16 nats, to well below on data of two gaits."""
+    generator, result = train_generator(
+        library,
+        tokenizer,
+        generator_config(tokenizer),
+        LoopSettings(tmp_path, 80, 3e-3),
+    )
+    assert not result.stopped
+    assert result.loss < 0.7 * np.log(16)
+    loaded = load_generator(tmp_path / "generator.safetensors")
+    MotionModel(tokenizer, loaded, "go2")  # belong together
+
+
+def test_a_resumed_tokenizer_is_bit_for_bit_the_uninterrupted_one(
+    library, tmp_path, monkeypatch
+):
+    settings = LoopSettings(tmp_path / "whole", 8, 3e-3)
+    whole, _ = train_tokenizer(library, TINY, settings)
+    halves = replace(settings, out=tmp_path / "halves")
+    stop_after(monkeypatch, 5)
+    _, result = train_tokenizer(library, TINY, halves)
+    assert (result.steps, result.stopped) == (5, True)
+    assert not (tmp_path / "halves" / "tokenizer.safetensors").exists()
+    torch.manual_seed(1234)  # what torch drew elsewhere must not matter
+    resumed, result = train_tokenizer(library, TINY, replace(halves, resume=True))
+    assert (result.steps, result.stopped) == (8, False)
+    assert same_weights(resumed, whole)
+
+
+def test_a_resumed_generator_is_bit_for_bit_the_uninterrupted_one(
+    library, tokenizer, tmp_path, monkeypatch
+):
+    config = generator_config(tokenizer)
+    settings = LoopSettings(tmp_path / "whole", 8, 3e-3)
+    whole, _ = train_generator(library, tokenizer, config, settings)
+    halves = replace(settings, out=tmp_path / "halves")
+    stop_after(monkeypatch, 5)
+    _, result = train_generator(library, tokenizer, config, halves)
+    assert (result.steps, result.stopped) == (5, True)
+    resumed, _ = train_generator(
+        library, tokenizer, config, replace(halves, resume=True)
+    )
+    assert same_weights(resumed, whole)
+
+
+def stop_after(monkeypatch, steps):
+    """Presses Ctrl-C during the given optimizer step, once."""
+    plain = torch.optim.AdamW.step
+    taken = 0
+
+    def step(self, *args, **kwargs):
+        nonlocal taken
+        taken += 1
+        if taken == steps:
+            os.kill(os.getpid(), signal.SIGINT)
+        return plain(self, *args, **kwargs)
+
+    monkeypatch.setattr(torch.optim.AdamW, "step", step)
+
+
+def test_ctrl_c_works_as_before_afterwards(library, tmp_path):
+    handler = signal.getsignal(signal.SIGINT)
+    train_tokenizer(library, TINY, LoopSettings(tmp_path, 1, 3e-3))
+    assert signal.getsignal(signal.SIGINT) is handler
+
+
+def test_a_checkpoint_of_another_run_is_refused(library, tmp_path):
+    settings = LoopSettings(tmp_path, 2, 3e-3)
+    train_tokenizer(library, TINY, settings)
+    with pytest.raises(InputError, match="other settings.*seed"):
+        train_tokenizer(library, TINY, replace(settings, seed=1, resume=True))
+    with pytest.raises(InputError, match="other settings.*network"):
+        train_tokenizer(
+            library, replace(TINY, width=32), replace(settings, resume=True)
+        )
+    with pytest.raises(InputError, match="no tokenizer-checkpoint"):
+        train_tokenizer(
+            library, TINY, replace(settings, out=tmp_path / "none", resume=True)
+        )
+
+
+def test_a_damaged_checkpoint_is_refused(library, tmp_path):
+    settings = LoopSettings(tmp_path, 1, 3e-3)
+    train_tokenizer(library, TINY, settings)
+    path = tmp_path / "checkpoint.safetensors"
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(InputError, match="damaged"):
+        train_tokenizer(library, TINY, replace(settings, resume=True))
+
+
+def test_windows_are_shifted_by_one_token(library, tokenizer):
+    """Where the input was not corrupted, it is the target of the step before."""
+    config = generator_config(tokenizer)
+    encoded = encode_clips(tokenizer, library.train)
+    random = np.random.default_rng(0)
+    before, labels, _, codes = make_batch(config, encoded[:16], random)
+    inside = codes[:, :-1] != IGNORE
+    agree = (before[:, 1:] == codes[:, :-1])[inside & (codes[:, 1:] != IGNORE)]
+    assert 0.8 < agree.float().mean() < 1.0
+    for row, sequence in zip(labels, encoded, strict=False):
+        assert set(row.tolist()) == {sequence.clip.label.index}
+
+
+def test_a_clip_gives_a_sequence_for_each_frame_of_a_token(library, tokenizer):
+    clip = library.train[0]
+    encoded = encode_clips(tokenizer, [clip])
+    assert [len(e) for e in encoded] == [(len(clip) - i) // 4 for i in range(4)]
