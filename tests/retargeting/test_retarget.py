@@ -142,7 +142,7 @@ def test_sliding_recording_gives_still_feet_and_a_larger_correction(
     slid_clip = sliding(clip, dog.contacts, 0.15)
     _, slid = retarget_clip(slid_clip, robot, solver=solver)
     assert slid.stance_slip_median_mps <= 0.03
-    assert slid.correction_rmse_m > 1.5 * still.correction_rmse_m
+    assert slid.correction_rmse_m > 3 * still.correction_rmse_m
 
 
 def test_targets_beyond_the_legs_are_moved_to_their_ends(robot):
