@@ -66,7 +66,7 @@ class Retarget:
             raise InputError(str(failed[0].error))
         write_json(self.json, {o.segment.name: _figures(o) for o in outcomes})
         rows = [_row(outcome) for outcome in outcomes if outcome.report is not None]
-        print_table(f"{len(rows)} motions in {out}", list(_COLUMNS), rows)
+        print_table(f"Motion files in {out}: {len(rows)}", list(_COLUMNS), rows)
         console = Console(stderr=True, highlight=False, soft_wrap=True)
         for outcome in failed:
             console.print(
