@@ -27,7 +27,7 @@ CONTACTS = ("similar", "lagged", "sap", "cenic")
 class PlantConfig:
     """How to simulate a robot; docs/contact.md says why these are the defaults."""
 
-    # Step of the discrete plant in s; not used by "cenic".
+    # Step of the discrete plant in s; the longest step of "cenic".
     time_step: float = 0.01
     # Drake's contact approximation of the discrete plant, or "cenic" for a continuous
     # plant whose integrator has error control; one of CONTACTS.

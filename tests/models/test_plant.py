@@ -200,8 +200,8 @@ def test_desired_velocity_folded_into_the_position_is_the_same_pd():
 def test_default_contact_against_itself_at_1_ms_and_against_cenic(name):
     """Over a 4 s trot of 1.3 m the default is within 13 %; see docs/contact.md.
 
-    The two references, a fine step and an integrator with error control that share no
-    contact solver, agree ten times better with each other.
+    The two references, a fine step and an integrator with error control, agree five
+    times better with each other.
     """
     default = trot(name, PlantConfig())
     fine = trot(name, PlantConfig(time_step=1e-3))
