@@ -37,8 +37,7 @@ def test_features_do_not_depend_on_place_and_heading(make_synthetic):
     q_turn, shift = yaw_quat(np.array(2.1)), np.array([3.0, -1.0, 0.0])
     moved = replace(
         motion,
-        base_position=quat_rotate(q_turn, motion.base_position)
-        + np.array([3.0, -1.0, 0.0]),
+        base_position=quat_rotate(q_turn, motion.base_position) + shift,
         base_quaternion=quat_multiply(q_turn, motion.base_quaternion),
     )
     np.testing.assert_allclose(

@@ -64,7 +64,7 @@ def test_training_makes_the_tokenizer_better(library, tokenizer, tmp_path):
 
 def test_training_makes_the_generator_better(library, tokenizer, tmp_path):
     """From chance, ln 16 nats, to well below on data of two gaits."""
-    generator, result = train_generator(
+    _, result = train_generator(
         library,
         tokenizer,
         generator_config(tokenizer),
@@ -132,9 +132,9 @@ def test_ctrl_c_works_as_before_afterwards(library, tmp_path):
 def test_a_checkpoint_of_another_run_is_refused(library, tmp_path):
     settings = LoopSettings(tmp_path, 2, 3e-3)
     train_tokenizer(library, TINY, settings)
-    with pytest.raises(InputError, match="other settings.*seed"):
+    with pytest.raises(InputError, match=r"other settings.*seed"):
         train_tokenizer(library, TINY, replace(settings, seed=1, resume=True))
-    with pytest.raises(InputError, match="other settings.*network"):
+    with pytest.raises(InputError, match=r"other settings.*network"):
         train_tokenizer(
             library, replace(TINY, width=32), replace(settings, resume=True)
         )
