@@ -9,7 +9,6 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from pydrake.multibody.parsing import PackageMap
 
 from loco_drake.errors import InputError
@@ -79,6 +78,9 @@ def convert_meshes() -> Path:
 
 def _convert(source: Path, target: Path, grain: float) -> None:
     """Writes the Collada file ``source`` as ``target`` (.obj) and an .mtl beside it."""
+    # Importing it takes longer than all the rest; only the first conversion needs it.
+    import trimesh
+
     scene = trimesh.load_scene(source)
     obj = [f"mtllib {target.stem}.mtl"]
     mtl = []
