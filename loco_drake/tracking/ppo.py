@@ -22,9 +22,10 @@ class PpoConfig:
         gamma: discount a step.
         gae_lambda: of generalized advantage estimation.
         clip: range of the probability ratio.
-        learning_rate: to start with.
-        target_kl: divergence that an update should have; the learning rate follows it
-            (Schulman et al. 2017; Rudin et al. 2022).
+        actor_rate: learning rate of the actor to start with.
+        target_kl: divergence that an update should have; the actor's learning rate
+            follows it (Schulman et al. 2017; Rudin et al. 2022).
+        critic_rate: learning rate of the critic, which has nothing to diverge from.
         log_std: initial log standard deviation of the actions.
         hidden: widths of the hidden layers of both networks.
     """
@@ -35,9 +36,10 @@ class PpoConfig:
     gamma: float = 0.97
     gae_lambda: float = 0.95
     clip: float = 0.2
-    learning_rate: float = 5e-4
+    actor_rate: float = 5e-4
     target_kl: float = 0.012
-    log_std: float = -1.0
+    critic_rate: float = 1e-3
+    log_std: float = -1.5
     hidden: list[int] = field(default_factory=lambda: [256, 128])
 
 
@@ -59,10 +61,18 @@ class ScaleReward(VecEnvWrapper):
 
 
 class AdaptivePPO(PPO):
-    """PPO whose learning rate keeps the KL divergence of an update near a target."""
+    """PPO whose actor's learning rate keeps the KL divergence of updates at a target."""
 
     target: float
     rate: float
+
+    def split_optimizer(self, critic_rate: float) -> None:
+        """Gives actor and critic parameter groups of their own."""
+        actor, critic = [], []
+        for name, parameter in self.policy.named_parameters():
+            (critic if "value" in name else actor).append(parameter)
+        groups = [{"params": actor}, {"params": critic, "lr": critic_rate}]
+        self.policy.optimizer = torch.optim.Adam(groups, lr=self.rate, eps=1e-5)
 
     def train(self) -> None:
         """Does one update, then sets the learning rate of the next."""
@@ -82,8 +92,7 @@ class AdaptivePPO(PPO):
 
     def _update_learning_rate(self, optimizers: Any) -> None:
         self.logger.record("train/learning_rate", self.rate)
-        for group in optimizers.param_groups:
-            group["lr"] = self.rate
+        optimizers.param_groups[0]["lr"] = self.rate
 
 
 def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
@@ -97,7 +106,7 @@ def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
     learner = AdaptivePPO(
         "MlpPolicy",
         normalized,
-        learning_rate=config.learning_rate,
+        learning_rate=config.actor_rate,
         n_steps=config.batch // environment.num_envs,
         batch_size=config.minibatch,
         n_epochs=config.epochs,
@@ -115,7 +124,8 @@ def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
         device="cpu",
     )
     learner.target = config.target_kl
-    learner.rate = config.learning_rate
+    learner.rate = config.actor_rate
+    learner.split_optimizer(config.critic_rate)
     return learner
 
 

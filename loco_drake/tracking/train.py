@@ -177,6 +177,10 @@ class _Saver(BaseCallback):
         for label, score in scores.items():
             self.logger.record(f"return/{label}", score)
         self.logger.record("train/std", float(_std(self._learner)))
+        episodes = self._learner.ep_info_buffer
+        if episodes:
+            lengths = [episode["l"] for episode in episodes]
+            self.logger.record("return/episode_steps", float(np.mean(lengths)))
         logged = {
             name: value
             for name, value in self.logger.name_to_value.items()
