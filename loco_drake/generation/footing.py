@@ -20,7 +20,7 @@ from loco_drake.rotations import quat_conjugate, quat_rotate
 
 Array = NDArray[np.float64]
 
-BASE_GAIN = 0.15  # share of the standing feet's mean offset that the base takes over
+BASE_GAIN = 0.05  # share of the standing feet's mean offset that the base takes over
 SWING_DECAY = 0.8  # of a swinging foot's offset, a frame
 SETTLING = 0.5  # share of its height over the ground that a standing foot loses
 REACH = 0.06  # m, a foot that would have to be moved farther slides

@@ -47,7 +47,7 @@ class GeneratorConfig:
     book_size: int
     frames_per_token: int
     labels: tuple[str, ...]
-    window: int = 24
+    window: int = 16
     width: int = 128
     layers: int = 4
     heads: int = 4

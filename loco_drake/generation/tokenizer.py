@@ -41,7 +41,7 @@ class TokenizerConfig:
     depth: int = 3
     frame_width: int = 48
     code_size: int = 32
-    books: int = 4
+    books: int = 8
     book_size: int = 128
 
 

@@ -11,6 +11,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from loco_drake.errors import InputError
+from loco_drake.gaits import GaitLabel
 from loco_drake.generation.determinism import single_thread
 from loco_drake.generation.generator import (
     LONGEST,
@@ -19,7 +20,8 @@ from loco_drake.generation.generator import (
     duration_bin,
     save_generator,
 )
-from loco_drake.generation.library import Clip, Library, Sampler
+from loco_drake.generation.library import Clip, Library
+from loco_drake.generation.stitching import Stitcher
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.train_tokenizer import clip_tensor
 from loco_drake.generation.training import LoopResult, LoopSettings, train
@@ -28,20 +30,21 @@ from loco_drake.motion import FPS
 BATCH = 32  # windows
 GROWTH = 12  # tokens by which a window grows while a chunk is written
 NO_HISTORY = 0.15  # share of windows that begin a sequence
+STITCHED = 30  # long motions to learn from, for each robot and label
+STITCHED_SECONDS = 20.0  # each
 CORRUPTION = 0.1  # share of input codes replaced, so that mistakes can be mended
-IGNORE = -100  # what cross-entropy skips
 
 
 @dataclass(frozen=True, eq=False)
 class Codes:
-    """The tokens of one clip, from one of the first frames on.
+    """The tokens of one motion.
 
     Attributes:
-        clip: of which.
+        label: index into gaits.LABELS.
         codes: shape (n, books).
     """
 
-    clip: Clip
+    label: int
     codes: NDArray[np.int64]
 
     def __len__(self) -> int:
@@ -49,19 +52,33 @@ class Codes:
 
 
 def encode_clips(tokenizer: Tokenizer, clips: Sequence[Clip]) -> list[Codes]:
-    """Returns the tokens of each clip, begun at each of a token's frames.
-
-    So a clip gives as many sequences as a token has frames: the same motion, cut
-    elsewhere.
-    """
+    """Returns the tokens of each clip."""
     encoded = []
     for clip in clips:
         robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
-        for start in range(tokenizer.config.frames_per_token):
-            with torch.inference_mode(), single_thread():
-                codes = tokenizer.encode(clip_tensor(tokenizer, clip, start), robot)
-            encoded.append(Codes(clip, codes[0].numpy()))
+        with torch.inference_mode(), single_thread():
+            codes = tokenizer.encode(clip_tensor(tokenizer, clip), robot)
+        encoded.append(Codes(clip.label.index, codes[0].numpy()))
     return encoded
+
+
+def stitched_clips(clips: Sequence[Clip], seed: int) -> list[Clip]:
+    """Returns long motions made of the clips, as many of each robot and label.
+
+    Raises:
+        InputError: if all clips of a robot and label are too short.
+    """
+    random = np.random.default_rng(seed)
+    groups: dict[tuple[str, GaitLabel], list[Clip]] = {}
+    for clip in clips:
+        groups.setdefault((clip.robot, clip.label), []).append(clip)
+    stitched = []
+    for (robot, label), group in sorted(groups.items()):
+        stitcher = Stitcher(group)
+        for _ in range(STITCHED):
+            features = stitcher(round(STITCHED_SECONDS * FPS), random)
+            stitched.append(Clip(robot, label, "stitched", features))
+    return stitched
 
 
 def train_generator(
@@ -73,20 +90,20 @@ def train_generator(
     """Trains a generator and writes ``generator.safetensors`` if it was not stopped.
 
     Raises:
-        InputError: if the tokenizer does not know a robot of the library.
+        InputError: if the tokenizer does not know a robot of the library, or all
+            clips of a label are too short.
     """
     missing = sorted(set(library.robots) - set(tokenizer.config.robots))
     if missing:
         known = ", ".join(tokenizer.config.robots)
         raise InputError(f"The tokenizer knows {known}, not {', '.join(missing)}.")
-    encoded = encode_clips(tokenizer, library.train)
-    sampler = Sampler([codes.clip for codes in encoded])
+    encoded = encode_clips(tokenizer, stitched_clips(library.train, settings.seed))
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
         generator = Generator(config)
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
-        chosen = [encoded[i] for i in sampler(random, BATCH)]
+        chosen = [encoded[i] for i in random.integers(len(encoded), size=BATCH)]
         loss = generator_loss(generator, *make_batch(config, chosen, random))
         return loss, {}
 
@@ -107,27 +124,20 @@ def make_batch(
     one of a longer performance.
 
     Returns:
-        before, labels, duration and codes as :meth:`Generator.forward` takes them;
-        codes past the end of a sequence are IGNORE.
+        before, labels, duration and codes as :meth:`Generator.forward` takes them.
     """
     length = config.window + GROWTH
     batch = len(chosen)
-    before = np.zeros((batch, length, config.books), dtype=np.int64)
-    codes = np.full((batch, length, config.books), IGNORE, dtype=np.int64)
-    labels = np.zeros((batch, length), dtype=np.int64)
-    seconds = np.empty(batch)
+    windows = np.empty((batch, length + 1, config.books), dtype=np.int64)
     for i, sequence in enumerate(chosen):
-        # The token before the window is its history; a sequence's first has none.
-        start = random.integers(-1, max(len(sequence) - length, len(sequence) // 2))
-        window = sequence.codes[max(start, 0) : start + 1 + length]
-        if start < 0 or random.random() < NO_HISTORY:
-            first = np.full((1, config.books), config.book_size)
-            window = np.concatenate((first, window[min(start + 1, 1) :]))
-        n = len(window) - 1
-        before[i, :n], codes[i, :n] = window[:-1], window[1:]
-        labels[i] = sequence.clip.label.index
-        shortest = n * config.frames_per_token / FPS
-        seconds[i] = shortest * (4 * LONGEST / shortest) ** random.random()
+        # The token before the window is all that the first step is told.
+        start = random.integers(len(sequence) - length)
+        windows[i] = sequence.codes[start : start + length + 1]
+    windows[random.random(batch) < NO_HISTORY, 0] = config.book_size
+    before, codes = windows[:, :-1].copy(), windows[:, 1:].copy()
+    labels = np.repeat([[sequence.label] for sequence in chosen], length, axis=1)
+    shortest = length * config.frames_per_token / FPS
+    seconds = shortest * (4 * LONGEST / shortest) ** random.random(batch)
     wrong = random.random(before.shape) < CORRUPTION * random.random((batch, 1, 1)) * 2
     wrong &= before < config.book_size
     before[wrong] = random.integers(config.book_size, size=int(wrong.sum()))
@@ -147,10 +157,8 @@ def generator_loss(
     codes: Tensor,
 ) -> Tensor:
     """Returns the mean cross-entropy in nats a code; see :meth:`Generator.forward`."""
-    logits = generator(before, labels, duration, codes.clamp(min=0))
-    return functional.cross_entropy(
-        logits.flatten(0, 2), codes.flatten(), ignore_index=IGNORE
-    )
+    logits = generator(before, labels, duration, codes)
+    return functional.cross_entropy(logits.flatten(0, 2), codes.flatten())
 
 
 def score_generator(
@@ -162,7 +170,7 @@ def score_generator(
     for sequence in encode_clips(tokenizer, clips):
         codes = torch.from_numpy(sequence.codes)[None]
         first = torch.full((1, 1, config.books), config.book_size)
-        labels = torch.full(codes.shape[:2], sequence.clip.label.index)
+        labels = torch.full(codes.shape[:2], sequence.label)
         duration = torch.from_numpy(duration_bin(np.array([LONGEST])))
         before = torch.cat((first, codes[:, :-1]), dim=1)
         with torch.inference_mode(), single_thread():

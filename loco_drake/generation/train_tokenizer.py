@@ -6,25 +6,31 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from torch import Tensor
 from torch.nn import functional
 
 from loco_drake.errors import InputError
 from loco_drake.generation.determinism import single_thread
-from loco_drake.generation.features import CONTACTS, JOINTS
+from loco_drake.generation.features import CONTACTS, JOINTS, VELOCITY, YAW_RATE
 from loco_drake.generation.library import Clip, Library, Sampler
 from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
 from loco_drake.generation.training import LoopResult, LoopSettings, train
 from loco_drake.models.robots import get_robot
 
+Array = NDArray[np.float64]
+
 WINDOW = 64  # frames
 BATCH = 32  # windows
+TEMPO = 1.15  # windows are played at most this much faster or slower
 
 # Weights of the losses; each is scaled to be about 1 before training.
 WEIGHTS = {
     "features": 1.0,  # squared error in standard deviations
     "speeds": 0.5,  # ... of its change from frame to frame
+    "accelerations": 0.5,  # ... of the change of that
     "toes": 1.0,  # squared error of toe positions, in units of TOE_SCALE
     "toe_speeds": 0.5,  # ... of their velocities over the ground, TOE_SPEED_SCALE
     "contacts": 0.2,  # cross-entropy
@@ -70,14 +76,11 @@ def train_tokenizer(
     tokenizer.set_statistics(torch.tensor(frames, dtype=torch.float32))
     toes = Toes([get_robot(name) for name in config.robots])
     sampler = Sampler(clips)
+    curves = {clip: CubicSpline(np.arange(len(clip)), clip.features) for clip in clips}
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         chosen = [clips[i] for i in sampler(random, BATCH)]
-        starts = [random.integers(len(clip) - WINDOW + 1) for clip in chosen]
-        windows = [
-            clip.features[start : start + WINDOW]
-            for clip, start in zip(chosen, starts, strict=True)
-        ]
+        windows = [cut_window(curves[clip], random) for clip in chosen]
         target = torch.tensor(np.stack(windows), dtype=torch.float32)
         robot = torch.tensor([config.robots.index(clip.robot) for clip in chosen])
         losses = tokenizer_losses(tokenizer, toes, target, robot)
@@ -92,6 +95,26 @@ def train_tokenizer(
         info = {"labels": [str(label) for label in library.labels]}
         save_tokenizer(tokenizer, Path(settings.out) / "tokenizer.safetensors", info)
     return tokenizer, result
+
+
+def cut_window(curve: CubicSpline, random: np.random.Generator) -> Array:
+    """Returns WINDOW frames from anywhere in a clip, a little faster or slower.
+
+    Feet that stand still do so at any tempo.
+
+    Args:
+        curve: the features of a clip over its frame numbers.
+        random: decides where and how fast.
+    """
+    last = curve.x[-1]
+    fastest = min(TEMPO, last / (WINDOW - 1))
+    tempo = min(TEMPO ** random.uniform(-1, 1), fastest)
+    start = random.uniform(0, last - tempo * (WINDOW - 1))
+    window: Array = curve(start + tempo * np.arange(WINDOW))
+    window[:, VELOCITY] *= tempo
+    window[:, YAW_RATE] *= tempo
+    window[:, CONTACTS] = window[:, CONTACTS] > 0.5
+    return window
 
 
 def tokenizer_losses(
@@ -115,6 +138,7 @@ def tokenizer_losses(
     return {
         "features": error.square().mean(),
         "speeds": error.diff(dim=1).square().mean() * 10,
+        "accelerations": error.diff(n=2, dim=1).square().mean() * 20,
         "toes": ((p_output - p_target) / TOE_SCALE).square().mean(),
         "toe_speeds": ((v_output - v_target) / TOE_SPEED_SCALE).square().mean(),
         "contacts": functional.binary_cross_entropy_with_logits(

@@ -242,7 +242,7 @@ def _progress() -> Progress:
 @contextmanager
 def _logs(folder: Path, step: int) -> Iterator[SummaryWriter]:
     """Yields a TensorBoard writer that overwrites what a lost run logged later."""
-    writer = SummaryWriter(str(folder / "logs"), purge_step=step or None)
+    writer = SummaryWriter(str(folder / "logs"), purge_step=step)
     try:
         yield writer
     finally:

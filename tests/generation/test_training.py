@@ -7,14 +7,19 @@ import pytest
 import torch
 
 from loco_drake.errors import InputError
-from loco_drake.generation.generator import GeneratorConfig, load_generator
+from loco_drake.generation.generator import (
+    GeneratorConfig,
+    duration_bin,
+    load_generator,
+)
 from loco_drake.generation.library import load_library
 from loco_drake.generation.motion_model import MotionModel
 from loco_drake.generation.tokenizer import TokenizerConfig, load_tokenizer
 from loco_drake.generation.train_generator import (
-    IGNORE,
+    CORRUPTION,
     encode_clips,
     make_batch,
+    stitched_clips,
     train_generator,
 )
 from loco_drake.generation.train_tokenizer import score_tokenizer, train_tokenizer
@@ -31,7 +36,7 @@ def library(motions):
 @pytest.fixture(scope="module")
 def tokenizer(library, tmp_path_factory):
     out = tmp_path_factory.mktemp("tokenizer")
-    train_tokenizer(library, TINY, LoopSettings(out, 60, 3e-3))
+    train_tokenizer(library, TINY, LoopSettings(out, 150, 5e-3))
     return load_tokenizer(out / "tokenizer.safetensors")
 
 
@@ -156,17 +161,14 @@ def test_a_damaged_checkpoint_is_refused(library, tmp_path):
 def test_windows_are_shifted_by_one_token(library, tokenizer):
     """Where the input was not corrupted, it is the target of the step before."""
     config = generator_config(tokenizer)
-    encoded = encode_clips(tokenizer, library.train)
+    encoded = encode_clips(tokenizer, stitched_clips(library.train, 0)[::3])
     random = np.random.default_rng(0)
-    before, labels, _, codes = make_batch(config, encoded[:16], random)
-    inside = codes[:, :-1] != IGNORE
-    agree = (before[:, 1:] == codes[:, :-1])[inside & (codes[:, 1:] != IGNORE)]
-    assert 0.8 < agree.float().mean() < 1.0
-    for row, sequence in zip(labels, encoded, strict=False):
-        assert set(row.tolist()) == {sequence.clip.label.index}
-
-
-def test_a_clip_gives_a_sequence_for_each_frame_of_a_token(library, tokenizer):
-    clip = library.train[0]
-    encoded = encode_clips(tokenizer, [clip])
-    assert [len(e) for e in encoded] == [(len(clip) - i) // 4 for i in range(4)]
+    before, labels, duration, codes = make_batch(config, encoded, random)
+    agree = (before[:, 1:] == codes[:, :-1]).float().mean()
+    assert 1 - CORRUPTION * 1.5 < agree < 1.0
+    starts = (before[:, 0] == config.book_size).all(dim=-1)
+    assert 0 < starts.sum() < len(encoded)
+    for row, sequence in zip(labels, encoded, strict=True):
+        assert set(row.tolist()) == {sequence.label}
+    # No window is told a duration that is shorter than itself.
+    assert duration.min() >= duration_bin(20 * 4 / 50)

@@ -1,0 +1,118 @@
+"""Long motions from short clips, by going over from one to another where they agree.
+
+Recorded gallops last two seconds; a generator that only sees them never learns what
+comes after the end of one. Here motions of any length are walks in a motion graph
+(Kovar, Gleicher, Pighin 2002): clips are left and entered at frames with like poses
+and speeds, and blended over a few frames.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.errors import InputError
+from loco_drake.generation.features import CONTACTS, JOINTS
+from loco_drake.generation.library import Clip
+from loco_drake.motion import FPS
+
+Array = NDArray[np.float64]
+
+BLEND = 8  # frames in which one clip goes over into another
+SHORTEST_STAY = 20  # frames in a clip between two blends
+EXITS = 10  # frames before and after the wished-for one at which a clip may be left
+GREED = 0.1  # spread of the costs among which a transition is drawn
+TO_THE_END = 0.5  # probability of staying in a clip to its end
+EVENNESS = 0.5  # cost of entering where it was played as often as on average
+
+
+class Stitcher:
+    """Makes long motions of clips of one robot and one label.
+
+    Args:
+        clips: those of up to 2 BLEND + SHORTEST_STAY frames are left out.
+
+    Raises:
+        InputError: if all clips are too short.
+    """
+
+    def __init__(self, clips: Sequence[Clip]) -> None:
+        self._clips = [c.features for c in clips if len(c) > 2 * BLEND + SHORTEST_STAY]
+        if not self._clips:
+            raise InputError(
+                f"A generator needs clips of more than {2 * BLEND + SHORTEST_STAY} "
+                f"frames of each label; those of {clips[0].label} are shorter."
+            )
+        # A frame is described by pose and speeds, in standard deviations.
+        every = np.concatenate(self._clips)
+        speeds = [np.gradient(c[:, JOINTS], 1 / FPS, axis=0) for c in self._clips]
+        described = np.concatenate((every, np.concatenate(speeds)), axis=1)
+        spread = np.maximum(described.std(axis=0), 1e-3)
+        spread[CONTACTS] = 2.0  # poses nearly say it already
+        self._frames = described / spread
+        lengths = [len(c) for c in self._clips]
+        self._first = np.cumsum([0, *lengths[:-1]])  # row in _frames of a clip's first
+        self._clip_of = np.repeat(np.arange(len(lengths)), lengths)
+        self._frame_of = np.concatenate([np.arange(n) for n in lengths])
+        left = np.repeat(lengths, lengths) - self._frame_of
+        self._enterable = np.flatnonzero(left > 2 * BLEND + SHORTEST_STAY)
+
+    def __call__(self, frames: int, random: np.random.Generator) -> Array:
+        """Returns the features of a motion of ``frames`` frames, shape (frames, SIZE).
+
+        It begins anywhere in a clip. Frames that were played less are preferred:
+        otherwise clips that slow down would lead from slow to slower, and all motion
+        end there.
+        """
+        played = np.zeros(len(self._frames))
+        row = int(random.choice(self._enterable))
+        clip, frame = int(self._clip_of[row]), int(self._frame_of[row])
+        parts: list[Array] = []
+        made = 0
+        while made < frames:
+            leave, (next_clip, enter) = self._transition(clip, frame, played, random)
+            weight = (np.arange(1, BLEND + 1) / (BLEND + 1))[:, None]
+            a = self._clips[clip][leave : leave + BLEND]
+            b = self._clips[next_clip][enter : enter + BLEND]
+            blend = (1 - weight) * a + weight * b
+            blend[:, CONTACTS] = blend[:, CONTACTS] > 0.5
+            parts += [self._clips[clip][frame:leave], blend]
+            made += leave - frame + BLEND
+            start = self._first[clip]
+            played[start + frame : start + leave] += 1
+            clip, frame = next_clip, enter + BLEND
+        return np.concatenate(parts)[:frames]
+
+    def _transition(
+        self, clip: int, frame: int, played: Array, random: np.random.Generator
+    ) -> tuple[int, tuple[int, int]]:
+        """Returns where to leave a clip that is at ``frame``, and where to go on."""
+        earliest, latest = frame + SHORTEST_STAY, len(self._clips[clip]) - BLEND
+        wished = latest
+        if random.random() > TO_THE_END:
+            wished = int(random.integers(earliest, latest + 1))
+        exits = np.arange(
+            max(wished - EXITS, earliest), min(wished + EXITS, latest) + 1
+        )
+        rows = self._first[clip] + exits
+        # (exits, enterable): mean squared difference.
+        a, b = self._frames[rows], self._frames[self._enterable]
+        cost = (a * a).sum(axis=1)[:, None] + (b * b).sum(axis=1) - 2 * a @ b.T
+        cost = np.maximum(cost, 0.0) / a.shape[1]
+        total = np.concatenate(([0.0], np.cumsum(played)))
+        ahead = total[self._enterable + SHORTEST_STAY] - total[self._enterable]
+        cost += EVENNESS * ahead / (SHORTEST_STAY * max(played.mean(), 1e-9))
+        # To go on where one is would be no transition.
+        same = self._clip_of[self._enterable] == clip
+        near = np.abs(self._frame_of[self._enterable] - exits[:, None]) < SHORTEST_STAY
+        cost[same & near] = np.inf
+        if not np.isfinite(cost).any():
+            cost = np.zeros_like(cost)
+        odds = np.exp((cost.min() - cost) / GREED).ravel()
+        choice = random.choice(len(odds), p=odds / odds.sum())
+        exit_index, target = divmod(int(choice), len(self._enterable))
+        row = int(self._enterable[target])
+        return int(exits[exit_index]), (
+            int(self._clip_of[row]),
+            int(self._frame_of[row]),
+        )
