@@ -1,0 +1,92 @@
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from loco_drake.systems.plan import PLAN_DT
+from loco_drake.systems.plan_player import PlanPlayer
+from loco_drake.systems.retiming import JointLimits, joint_limits
+from loco_drake.systems.toppra_smoother import ToppraSmoother, smooth_plan
+
+
+def tight(robot, share):
+    """Limits below what the plan asks for."""
+    own = joint_limits(robot)
+    return JointLimits(own.speed, own.acceleration * share)
+
+
+def build(robot, plan, limits):
+    builder = DiagramBuilder()
+    player = builder.AddNamedSystem("player", PlanPlayer(robot, plan))
+    smoother = builder.AddNamedSystem("smoother", ToppraSmoother(robot, limits=limits))
+    builder.Connect(player.GetOutputPort("plan"), smoother.GetInputPort("plan"))
+    builder.ExportOutput(smoother.GetOutputPort("plan"), "plan")
+    builder.ExportOutput(smoother.GetOutputPort("path_time"), "path_time")
+    return builder.Build()
+
+
+def test_a_plan_within_the_limits_passes_unchanged(go2, trot):
+    smooth = smooth_plan(go2, trot, joint_limits(go2))
+    np.testing.assert_allclose(smooth.q, trot.q, atol=1e-12)
+    np.testing.assert_allclose(smooth.v, trot.v, atol=1e-12)
+    np.testing.assert_array_equal(smooth.contacts, trot.contacts)
+    np.testing.assert_allclose(smooth.path_time, trot.path_time, atol=1e-12)
+
+
+def test_what_is_played_keeps_the_limits_and_the_path(go2, trot):
+    limits = tight(go2, 0.08)
+    raw = np.abs(np.diff(trot.q[:, 7:], n=2, axis=0)).max(axis=0) / PLAN_DT**2
+    assert (raw > 1.3 * limits.acceleration).any()
+    smooth = smooth_plan(go2, trot, limits)
+    played = np.abs(np.diff(smooth.q[:, 7:], n=2, axis=0)).max(axis=0) / PLAN_DT**2
+    assert (played <= 1.1 * limits.acceleration).all()
+    assert len(smooth) > 1.05 * len(trot)
+    assert np.diff(smooth.path_time).max() <= PLAN_DT * (1 + 1e-9)
+    # The same feet, later: the toes of the raw plan at the time that has passed.
+    k = np.rint(smooth.path_time / PLAN_DT).astype(int)
+    np.testing.assert_array_equal(smooth.contacts, trot.contacts[k])
+    at = np.stack(
+        [np.interp(smooth.path_time, trot.path_time, x) for x in trot.q[:, 7:].T], 1
+    )
+    np.testing.assert_allclose(smooth.q[:, 7:], at, atol=0.03)
+
+
+def test_velocities_are_those_of_what_is_played(go2, trot):
+    smooth = smooth_plan(go2, trot, tight(go2, 0.08))
+    differences = np.gradient(smooth.q[:, 4:], PLAN_DT, axis=0)[1:-1]
+    error = smooth.v[1:-1, 3:] - differences
+    assert np.sqrt(np.mean(error**2)) < 0.1 * np.sqrt(np.mean(differences**2))
+
+
+@pytest.mark.parametrize("share", [1.0, 0.08])
+def test_the_system_plays_what_smoothing_at_once_gives(go2, trot, share):
+    limits = tight(go2, share)
+    whole = smooth_plan(go2, trot, limits)
+    diagram = build(go2, trot, limits)
+    simulator = Simulator(diagram)
+    context = simulator.get_context()
+    for time in (0.0, 0.5, 1.7, 3.0):
+        simulator.AdvanceTo(time)
+        plan = diagram.GetOutputPort("plan").Eval(context)
+        assert plan.start_time <= time
+        assert plan.end_time >= time + 0.9  # it looks ahead
+        k, n = plan.index(time), whole.index(time)
+        np.testing.assert_array_equal(plan.q[k : k + 40], whole.q[n : n + 40])
+        used = diagram.GetOutputPort("path_time").Eval(context)[0]
+        assert used == plan.path_time[-1]
+
+
+def test_what_was_committed_never_changes(go2, trot):
+    diagram = build(go2, trot, tight(go2, 0.08))
+    simulator = Simulator(diagram)
+    simulator.Initialize()
+    context = simulator.get_context()
+    seen = {}
+    for step in range(30):
+        simulator.AdvanceTo(0.1 * step)
+        plan = diagram.GetOutputPort("plan").Eval(context)
+        for k in range(len(plan)):
+            n = round(plan.start_time / PLAN_DT) + k
+            q = seen.setdefault(n, plan.q[k])
+            np.testing.assert_array_equal(q, plan.q[k])
+    assert len(seen) > 180

@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+import torch
+
+from loco_drake.errors import InputError
+from loco_drake.models.robots import get_robot
+from loco_drake.systems.actor import (
+    Actor,
+    ActorConfig,
+    load_actor,
+    save_actor,
+)
+from loco_drake.systems.observation import OBSERVATION_SIZE
+from loco_drake.systems.tracking_policy import TrackingPolicy
+from loco_drake.weights import load_weights, save_weights
+
+
+@pytest.fixture
+def actor():
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(0)
+        actor = Actor(ActorConfig(robot="go2", labels=["dog-trot"], hidden=[8, 6]))
+        actor.mean.normal_()
+        actor.variance.uniform_(0.5, 2.0)
+    return actor.eval()
+
+
+def test_the_system_computes_the_network(actor):
+    """By numpy: normalise, clip, two ELU layers, one linear."""
+    observation = 3 * np.random.default_rng(0).standard_normal(OBSERVATION_SIZE)
+    policy = TrackingPolicy(actor)
+    context = policy.CreateDefaultContext()
+    policy.GetInputPort("observation").FixValue(context, observation)
+    x = (observation - actor.mean.numpy()) / np.sqrt(actor.variance.numpy() + 1e-8)
+    x = np.clip(x, -5, 5)
+    weights = [p.detach().double().numpy() for p in actor.layers.parameters()]
+    for W, b in zip(weights[0:4:2], weights[1:4:2], strict=True):
+        x = W @ x + b
+        x = np.where(x > 0, x, np.exp(np.minimum(x, 0)) - 1)
+    expected = weights[4] @ x + weights[5]
+    action = policy.GetOutputPort("action").Eval(context)
+    np.testing.assert_allclose(action, expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("half", [False, True])
+def test_saved_policies_come_back(actor, tmp_path, half):
+    path = tmp_path / "policy.safetensors"
+    save_actor(actor, path, half=half)
+    again = load_actor(path, get_robot("go2"))
+    assert again.config == actor.config
+    tolerance = 1e-3 if half else 0.0
+    loaded = again.state_dict()
+    for name, value in actor.state_dict().items():
+        torch.testing.assert_close(loaded[name], value, rtol=tolerance, atol=tolerance)
+
+
+def test_a_policy_of_another_robot_is_refused(actor, tmp_path):
+    path = tmp_path / "policy.safetensors"
+    save_actor(actor, path)
+    with pytest.raises(InputError, match="for another robot: go2, not a1"):
+        load_actor(path, get_robot("a1"))
+
+
+def test_a_policy_of_another_observation_is_refused(actor, tmp_path):
+    path = tmp_path / "policy.safetensors"
+    save_actor(actor, path)
+    tensors, config = load_weights(path, "policy")
+    config["observation_layout"][0][0] = "gravity_W"
+    save_weights(path, "policy", tensors, config)
+    with pytest.raises(InputError, match="another observation layout"):
+        load_actor(path, get_robot("go2"))
+
+
+def test_damaged_weights_are_refused(actor, tmp_path):
+    path = tmp_path / "policy.safetensors"
+    save_actor(actor, path)
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(InputError, match="damaged"):
+        load_actor(path, get_robot("go2"))
