@@ -1,0 +1,88 @@
+import ast
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from loco_drake.models.robots import get_robot
+from loco_drake.systems.actor import load_actor
+from tests.synthetic import write_dog_recording
+
+ROOT = Path(__file__).parents[2]
+
+
+def run(cwd, name, *arguments):
+    """Runs an example from another folder; returns what it printed."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "LOCO_DRAKE_CACHE": str(cwd)}
+    process = subprocess.run(
+        [sys.executable, ROOT / "examples" / name, *map(str, arguments)],
+        cwd=cwd,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert process.returncode == 0, process.stderr
+    return process.stdout
+
+
+def test_simulate_walks_ahead(tmp_path):
+    printed = run(tmp_path, "simulate.py", "--duration", "2")
+    speed = float(re.search(r"([\d.]+) m/s", printed).group(1))
+    assert 0.3 < speed < 2.0
+
+
+def test_retarget_saves_a_replay_of_the_recording(tmp_path):
+    write_dog_recording(tmp_path / "dog.txt", "trot", seconds=2.0)
+    arguments = ("--gait", "trot", "--end", "90", "--html", "replay.html")
+    printed = run(tmp_path, "retarget.py", "dog.txt", *arguments)
+    # 89 steps of 1/60 s hold 74 whole ones of 20 ms.
+    assert "75 frames" in printed
+    page = (tmp_path / "replay.html").read_text()
+    assert "<html" in page
+    assert 1e6 < len(page) < 10e6
+
+
+def test_train_tracker_learns_and_leaves_a_policy_that_loads(tmp_path):
+    arguments = ("--steps", "512", "--batch", "256", "--references", "1")
+    few = ("--seconds", "3", "--workers", "1", "--out", "out")
+    printed = run(tmp_path, "train_tracker.py", *arguments, *few)
+    for steps in (256, 512):
+        assert f"{steps} of 512 steps: dog-pace" in printed
+    actor = load_actor(tmp_path / "out" / "policy.safetensors", get_robot("go2"))
+    assert actor.config.labels == ["dog-pace", "dog-trot"]
+    assert np.isfinite(actor.mean.numpy()).all()
+    assert (actor.mean.numpy() != 0).any()  # it has seen observations
+
+
+def test_readme_shows_the_first_example_as_it_is():
+    source = (ROOT / "examples" / "simulate.py").read_text()
+    docstring = ast.parse(source).body[0]
+    body = "".join(source.splitlines(keepends=True)[docstring.end_lineno :]).lstrip()
+    (block,) = re.findall(
+        r"^```python\n(.*?)^```$",
+        (ROOT / "README.md").read_text(),
+        flags=re.DOTALL | re.MULTILINE,
+    )
+    assert block == body
+
+
+def test_every_example_is_run_here():
+    run_here = re.findall(r'run\(tmp_path, "(\w+\.py)"', Path(__file__).read_text())
+    assert sorted(run_here) == sorted(p.name for p in (ROOT / "examples").glob("*.py"))
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")))
+def test_main_guard_keeps_imports_free_of_work(path):
+    """Worker processes import the script again, so only the guard may do work."""
+    *statements, guard = ast.parse(path.read_text()).body
+    assert ast.unparse(guard).startswith("if __name__ == '__main__':")
+    allowed = (ast.Import, ast.ImportFrom, ast.FunctionDef, ast.Assign)
+    docstring, *others = statements
+    assert isinstance(docstring.value.value, str)
+    assert all(isinstance(statement, allowed) for statement in others)
