@@ -1,9 +1,9 @@
 """Retarget one recording to a robot and look at it, without physics.
 
 Prints how far the toes had to be moved from where the formula puts them so that they
-stand still. Then shows a replay in Meshcat: the robot as it should move, with spheres
-at its toes (front blue, rear red), withers and hip (green). With --html the replay is
-saved instead, as a page to be opened in a browser.
+stand still. Then plays the motion in Meshcat, at the address that is printed: the robot
+as it should move, with spheres at its toes (front blue, rear red), withers and hip
+(green). With --html the replay is saved instead, as a page to be opened in a browser.
 """
 
 from pathlib import Path
@@ -45,7 +45,7 @@ def retarget(
         start: first frame, from 0.
         end: frame after the last; by default the end of the file.
         robot: go2 or a1.
-        html: where to save the replay instead of showing it.
+        html: where to save the replay, instead of playing it in real time.
     """
     clip = read_clip(source, recording, gait=gait, start=start, end=end)
     model = get_robot(robot)
@@ -55,15 +55,15 @@ def retarget(
     meshcat = Meshcat()
     plan = plan_from_motion(model, motion)
     simulator = Simulator(make_playback(model, plan, meshcat))
+    if html is None:
+        simulator.set_target_realtime_rate(1.0)
     meshcat.StartRecording(frames_per_second=32.0)
     simulator.AdvanceTo(plan.end_time)
     meshcat.PublishRecording()
-    if html is None:
-        input(f"The replay is at {meshcat.web_url()}; Enter ends this. ")
-        return
-    with atomic_path(html) as temporary:
-        temporary.write_text(meshcat.StaticHtml())
-    print(f"The replay is in {html}.")
+    if html is not None:
+        with atomic_path(html) as temporary:
+            temporary.write_text(meshcat.StaticHtml())
+        print(f"The replay is in {html}.")
 
 
 def make_playback(robot: Robot, plan: Plan, meshcat: Meshcat) -> Diagram:

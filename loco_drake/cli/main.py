@@ -27,6 +27,7 @@ _COMMANDS = {
     ),
     "train tracker": ("train_tracker", "TrainTracker", "the policy, by PPO"),
 }
+_HELP = ("-h", "--help")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -39,47 +40,57 @@ def main(arguments: list[str] | None = None) -> int:
         arguments: instead of those of the process.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
-    # Drake reports harmless properties of models at this level.
-    logging.getLogger("drake").setLevel(logging.ERROR)
     try:
-        if not arguments or arguments[0] in ("-h", "--help"):
-            _print_help()
+        if not arguments or arguments[0] in _HELP:
+            _print_help(list(_COMMANDS))
             return 0
         if arguments[0] == "--version":
             print(__version__)
             return 0
-        name, rest = _split(arguments)
+        members = [n for n in _COMMANDS if n.startswith(f"{arguments[0]} ")]
+        if members and arguments[1:2] and arguments[1] in _HELP:
+            _print_help(members)
+            return 0
+        name, rest = _split(arguments, members)
         module, class_name, _ = _COMMANDS[name]
         command = getattr(import_module(f"loco_drake.cli.{module}"), class_name)
+        # Drake reports harmless properties of models below this level, which importing
+        # it sets anew.
+        logging.getLogger("drake").setLevel(logging.ERROR)
         status: int = tyro.cli(command, prog=f"loco-drake {name}", args=rest).run()
         return status
     except InputError as error:
         print(f"loco-drake: {error}", file=sys.stderr)
         return 2
+    except OSError as error:
+        # A full disk, a folder that may not be written to: not this program's fault.
+        print(f"loco-drake: {error}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print("loco-drake: interrupted", file=sys.stderr)
         return 1
 
 
-def _split(arguments: list[str]) -> tuple[str, list[str]]:
-    """Returns the command's name and its own arguments."""
-    groups = {name.split()[0] for name in _COMMANDS if " " in name}
-    words = 1
-    if arguments[0] in groups:
-        words = 2
-        members = [n for n in _COMMANDS if n.startswith(f"{arguments[0]} ")]
-        if arguments[1:2] in ([], ["-h"], ["--help"]):
-            raise InputError(f"Say which: {', '.join(members)}.")
+def _split(arguments: list[str], members: list[str]) -> tuple[str, list[str]]:
+    """Returns the command's name and its own arguments.
+
+    Args:
+        arguments: at least one.
+        members: the commands of two words whose first word comes first.
+    """
+    words = 2 if members else 1
+    if len(arguments) < words:
+        raise InputError(f"Say which: {', '.join(members)}.")
     name = " ".join(arguments[:words])
-    check_choice("command", name, _COMMANDS)
+    check_choice("command", name, members or _COMMANDS)
     return name, arguments[words:]
 
 
-def _print_help() -> None:
+def _print_help(names: list[str]) -> None:
     console = Console()
     console.print("loco-drake: quadruped motion, learned and simulated in Drake\n")
     table = Table(box=None, show_header=False, padding=(0, 2))
-    for name, (_, _, text) in _COMMANDS.items():
-        table.add_row(f"loco-drake {name}", text)
+    for name in names:
+        table.add_row(f"loco-drake {name}", _COMMANDS[name][2])
     console.print(table)
     console.print("\nEach command explains its options with --help.")

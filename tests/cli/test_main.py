@@ -1,0 +1,203 @@
+"""The contract of the command line: what it refuses, how, and with which status."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+import torch
+
+from loco_drake import __version__
+from loco_drake.cli.main import _COMMANDS, main
+from loco_drake.gaits import LABELS
+from loco_drake.generation.pretrained import pretrained_path
+from loco_drake.generation.tokenizer import save_tokenizer
+from loco_drake.motion import save_motion
+from loco_drake.systems.actor import Actor, ActorConfig, save_actor
+from tests.synthetic_motion import synthetic_motion
+from tests.tiny_model import make_tiny_model
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Files that are wrong, each in its own way."""
+    folder = tmp_path_factory.mktemp("files")
+    (folder / "text.npz").write_text("not an archive")
+    (folder / "empty").mkdir()
+    motion = synthetic_motion(seconds=0.5)
+    whole = folder / "motions" / "whole.npz"
+    save_motion(motion, whole)
+    with np.load(whole) as archive:
+        arrays = dict(archive)
+    header = json.loads(str(arrays["header"]))
+
+    def write(name, **changes):
+        np.savez(folder / name, **{**arrays, **changes})
+
+    def with_header(**changes):
+        return json.dumps({k: v for k, v in {**header, **changes}.items() if v})
+
+    nan = arrays["base_position"].copy()
+    nan[3, 1] = np.nan
+    write("nan.npz", base_position=nan)
+    write("joints.npz", joint_positions=arrays["joint_positions"][:, :8])
+    write("no_rate.npz", header=with_header(fps=None))
+    write("future.npz", header=with_header(schema_version=99))
+    write("a1.npz", header=with_header(robot="a1"))
+
+    policy = folder / "policy.safetensors"
+    save_policy(policy, "go2")
+    save_policy(folder / "policy_of_a1.safetensors", "a1")
+    (folder / "cut.safetensors").write_bytes(policy.read_bytes()[:-100])
+    tokenizer = pretrained_path("tokenizer").read_bytes()
+    (folder / "cut_tokenizer.safetensors").write_bytes(tokenizer[:-100])
+    other = folder / "other_tokenizer.safetensors"
+    save_tokenizer(make_tiny_model().tokenizer, other, {})
+    return folder
+
+
+def save_policy(path, robot):
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(0)
+        save_actor(Actor(ActorConfig(robot=robot, labels=["dog-trot"])), path)
+
+
+GAITS = ", ".join(str(label) for label in LABELS)
+DURATION = "The duration must be above 0"
+
+# Arguments, in which FILES/ stands for the folder above, and what is said of them.
+WRONG = {
+    "fly": "Unknown command 'fly'; the choices are simulate, generate, .*train tracker",
+    "train": "Say which: train tokenizer, train generator, train tracker",
+    "train fly": "'train fly'; the choices are train tokenizer, train generator",
+    "data": "Say which: data list, data inspect",
+    "simulate --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
+    "simulate --robot a1": "weights are not for the robot 'a1'; there are .* go2",
+    "simulate --gait dog-fly": f"Unknown gait 'dog-fly'; the choices are {GAITS}",
+    "simulate --gait horse-walk": "not trained on horse-walk; .* dog-pace, dog-trot",
+    "simulate --duration 0": DURATION,
+    "simulate --duration -1": DURATION,
+    "simulate --duration nan": DURATION,
+    "simulate --duration inf": DURATION,
+    "simulate --duration 1e9": DURATION,
+    "simulate --seed -1": "The seed must be 0 or more, not -1",
+    "simulate --robot a1 --reference FILES/a1.npz": "for a1 yet; .* for go2",
+    "simulate --contact tamsi": "'tamsi'; the choices are similar, lagged, sap, cenic",
+    "simulate --time-step 0": "time_step must be above 0, not 0.0",
+    "simulate --friction nan": "friction must be above 0, not nan",
+    "simulate --port 80 --meshcat": "The port must be from 1024 to 65535, not 80",
+    "simulate --reference FILES/none.npz": "must be gpt or a Motion file",
+    "simulate --reference FILES/text.npz": "is not a Motion file",
+    "simulate --reference FILES/nan.npz": "base_position of this motion hold NaN",
+    "simulate --reference FILES/joints.npz": r"must have shape \(26, 12\), not",
+    "simulate --reference FILES/no_rate.npz": "lacks fps",
+    "simulate --reference FILES/future.npz": "has Motion schema 99",
+    "simulate --reference FILES/a1.npz": "is a motion of a1, not of go2",
+    "simulate --policy FILES/none.safetensors": "There are no policy weights at",
+    "simulate --policy FILES/cut.safetensors": "cut.safetensors is damaged",
+    "simulate --policy FILES/cut_tokenizer.safetensors": "is damaged",
+    "simulate --policy FILES/policy_of_a1.safetensors": "another robot: a1, not go2",
+    "generate --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
+    "generate --robot a1": "weights are not for the robot 'a1'; there are .* go2",
+    "generate --gait fly": f"Unknown gait 'fly'; the choices are {GAITS}",
+    "generate --duration nan": DURATION,
+    "generate --count 0": "--count must be 1 or more, not 0",
+    "generate --seed -1": "--seed must be 0 or more, not -1",
+    "generate --tokenizer FILES/cut_tokenizer.safetensors": "is damaged",
+    "generate --tokenizer FILES/policy.safetensors": "holds policy weights",
+    "generate --tokenizer FILES/other_tokenizer.safetensors": "are for the tokenizer",
+    "retarget --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
+    "retarget --data-dir FILES/none": "There is no data folder .*LOCO_DRAKE_DATA",
+    "data list --data-dir FILES/none": "There is no data folder .*LOCO_DRAKE_DATA",
+    "data inspect FILES/none.txt": "There is no file",
+    "data inspect FILES/none.txt --source cat": "'cat'; the choices are dog",
+    "train tokenizer --motions FILES/empty": r"no Motion files",
+    "train tokenizer --steps 0": "--steps must be 1 or more, not 0",
+    "train generator --motions FILES/motions --tokenizer FILES/no": "no tokenizer",
+    "train tracker --references FILES/empty": r"no Motion files \(\*.npz\)",
+    "train tracker --references FILES/empty --robot spot": "the choices are go2, a1",
+    "train tracker --references FILES/empty --steps 0": "steps must be at least 1",
+}
+
+
+@pytest.mark.parametrize("line", WRONG)
+def test_wrong_input_is_one_sentence_and_status_2(
+    line, files, tmp_path, monkeypatch, capsys
+):
+    """Nothing else is printed, and nothing is left on disk."""
+    monkeypatch.chdir(tmp_path)
+    arguments = line.replace("FILES", str(files)).split()
+    if arguments[0] == "simulate" and "--meshcat" not in arguments:
+        arguments.append("--no-meshcat")
+    if " ".join(arguments[:2]) in _COMMANDS or arguments[0] in _COMMANDS:
+        arguments += ["--json", "figures.json"]
+    assert main(arguments) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert re.fullmatch(r"loco-drake: [^\n]+\.\n", printed.err), printed.err
+    assert re.search(WRONG[line], printed.err), printed.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "line", ["simulate --walk", "simulate --duration x", "generate --count 1.5"]
+)
+def test_options_that_cannot_be_read_are_status_2(line, capsys):
+    with pytest.raises(SystemExit) as exit_info:
+        main(line.split())
+    assert exit_info.value.code == 2
+    assert line.split()[1] in capsys.readouterr().err
+
+
+def test_help_lists_every_command_and_version_is_the_package_s(capsys):
+    assert main([]) == main(["--help"]) == 0
+    printed = capsys.readouterr().out
+    assert all(printed.count(f"loco-drake {name} ") == 2 for name in _COMMANDS)
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"{__version__}\n"
+
+
+def test_help_of_a_group_lists_its_commands_only(capsys):
+    assert main(["train", "--help"]) == 0
+    printed = capsys.readouterr().out
+    assert "train tracker" in printed
+    assert "loco-drake simulate" not in printed
+
+
+@pytest.mark.parametrize("name", _COMMANDS)
+def test_help_of_each_command_has_seed_and_json(name, capsys):
+    with pytest.raises(SystemExit) as exit_info:
+        main([*name.split(), "--help"])
+    assert exit_info.value.code == 0
+    printed = capsys.readouterr().out
+    for option in ("--seed INT", "--json"):
+        assert option in printed
+
+
+def test_help_of_simulate_has_units_and_defaults(capsys):
+    with pytest.raises(SystemExit):
+        main(["simulate", "--help"])
+    # Each option with what is said of it, on one line.
+    printed = re.sub(r"[\s│]+", " ", capsys.readouterr().out)
+    assert re.search(r"--robot STR [^(]*go2 or a1[^(]* \(default: go2\)", printed)
+    assert re.search(r"--gait STR [^(]* \(default: dog-trot\)", printed)
+    assert re.search(r"--duration FLOAT Seconds [^(]* \(default: 10.0\)", printed)
+    assert re.search(r"--time-step FLOAT [^(]*, s. \(default: 0.01\)", printed)
+
+
+def test_a_file_that_cannot_be_written_is_status_1(made_data, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    target = str(tmp_path / "file" / "a.json")
+    assert main(["data", "list", "--data-dir", str(made_data), "--json", target]) == 1
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert error.startswith("loco-drake: ")
+
+
+def test_ctrl_c_is_status_1_without_traceback(monkeypatch, tmp_path, capsys):
+    def interrupt(self):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("loco_drake.cli.data.DataList.run", interrupt)
+    assert main(["data", "list"]) == 1
+    assert capsys.readouterr().err == "loco-drake: interrupted\n"

@@ -1,0 +1,123 @@
+import json
+import re
+import socket
+
+import pytest
+import torch
+
+from loco_drake.cli.main import main
+from loco_drake.motion import save_motion
+from loco_drake.systems.actor import Actor, ActorConfig, save_actor
+from tests.synthetic_motion import synthetic_motion
+
+KEYS = {
+    "robot",
+    "gait",
+    "duration_s",
+    "fell",
+    "normalized_return",
+    "joint_rmse_rad",
+    "base_position_rmse_m",
+    "base_orientation_rmse_rad",
+    "stretch",
+    "speed_mps",
+    "real_time_factor",
+}
+
+
+@pytest.fixture(scope="module")
+def weights(tmp_path_factory):
+    """Policies that know nothing: one leaves the reference alone, one tumbles."""
+    folder = tmp_path_factory.mktemp("weights")
+    for name, bias in (("calm", 0.0), ("wild", 8.0)):
+        actor = Actor(ActorConfig(robot="go2", labels=["dog-trot"]))
+        last = actor.layers[-1]
+        with torch.no_grad():
+            last.weight.zero_()
+            # Stretches the legs of one side and folds those of the other.
+            last.bias.copy_(bias * torch.tensor([0, 1, 1, 0, -1, -1] * 2))
+        save_actor(actor, folder / f"{name}.safetensors")
+    return folder
+
+
+def simulate(folder, *arguments):
+    """Runs the command; returns its figures."""
+    path = folder / "figures.json"
+    assert main(["simulate", *map(str, arguments), "--json", str(path)]) == 0
+    return json.loads(path.read_text())
+
+
+def test_json_has_the_agreed_keys_and_the_table_its_units(weights, tmp_path, capsys):
+    policy = weights / "calm.safetensors"
+    line = ("--duration", 0.5, "--gait", "dog-pace", "--no-meshcat", "--policy", policy)
+    figures = simulate(tmp_path, *line)
+    assert set(figures) >= KEYS
+    assert (figures["robot"], figures["gait"]) == ("go2", "dog-pace")
+    assert figures["duration_s"] == figures["simulated_s"] == 0.5
+    assert not figures["fell"]
+    assert 0 < figures["normalized_return"] < 100
+    printed = capsys.readouterr().out
+    for row in ("joint rmse .* rad", "speed .* m/s", "normalized return .* of 100"):
+        name, unit = row.split(" .* ")
+        (text,) = [
+            line for line in printed.splitlines() if line.strip().startswith(name)
+        ]
+        assert text.strip().endswith(unit)
+
+
+def test_one_seed_gives_one_outcome_another_seed_another(weights, tmp_path):
+    def figures(seed):
+        line = ("--duration", 1, "--seed", seed, "--no-meshcat")
+        found = simulate(tmp_path, *line, "--policy", weights / "calm.safetensors")
+        del found["real_time_factor"], found["seed"]
+        return found
+
+    assert figures(1) == figures(1) != figures(2)
+
+
+def test_a_fall_is_a_result(weights, tmp_path):
+    """Status 0, and the steps that were not made count as lost."""
+    policy = weights / "wild.safetensors"
+    line = ("--duration", 5, "--no-meshcat", "--policy", policy)
+    figures = simulate(tmp_path, *line)
+    assert figures["fell"]
+    assert figures["simulated_s"] < 5
+    assert figures["normalized_return"] < 100 * figures["simulated_s"] / 5
+
+
+def test_a_motion_file_is_played_for_as_long_as_it_is(weights, tmp_path):
+    save_motion(synthetic_motion("dog-pace", seconds=1.0), tmp_path / "a.npz")
+    line = ("--reference", tmp_path / "a.npz", "--no-meshcat")
+    figures = simulate(tmp_path, *line, "--policy", weights / "calm.safetensors")
+    assert figures["gait"] == "dog-pace"
+    # The default of 10 s is cut; the smoother may stretch the motion's 1 s a little.
+    assert 0.9 <= figures["duration_s"] <= 1.2
+
+
+def test_port_in_use_and_replay(weights, tmp_path, monkeypatch, capsys):
+    """Meshcat takes a free port, and the replay that it saves is of moderate size."""
+    monkeypatch.setenv("LOCO_DRAKE_CACHE", str(tmp_path / "cache"))
+    policy, page = weights / "calm.safetensors", tmp_path / "replay.html"
+    with socket.socket() as taken:
+        taken.bind(("", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        line = ("--port", port, "--html", page, "--duration", 0.2, "--policy", policy)
+        assert simulate(tmp_path, *line)["duration_s"] == 0.2
+    printed = capsys.readouterr()
+    assert f"Port {port} is in use" in printed.err
+    assert "http://localhost:" in printed.out
+    assert str(port) not in printed.out
+    assert "<html" in page.read_text()[:1000]
+    assert 1e6 < page.stat().st_size < 10e6
+
+
+@pytest.mark.parametrize("gait", ["dog-pace", "dog-trot"])
+def test_shipped_weights_carry_the_go2_for_ten_seconds(gait, tmp_path):
+    figures = simulate(tmp_path, "--gait", gait, "--seed", 3, "--no-meshcat")
+    assert figures["duration_s"] == figures["simulated_s"] == 10.0
+    assert not figures["fell"]
+    assert figures["normalized_return"] >= 75
+    assert figures["joint_rmse_rad"] <= 0.08
+    assert figures["base_position_rmse_m"] <= 0.08
+    assert figures["stretch"] <= 1.1
