@@ -1,0 +1,220 @@
+"""What the environment costs beyond the plant: prints the ratio of their speeds.
+
+The environment is stepped with zero actions on generated references, resets included.
+The bare plant (plant and scene graph, nothing else) is stepped as often at the same
+rate, in the same episodes: it starts in the same states and is sent the same targets,
+so that its legs swing and land as often; resets are not counted. For comparison it also
+stands still, which is easier for the contact solver. All take turns in one process, and
+medians of its processor time are compared, so that a busy machine does little harm.
+Run it from the root of the repository:
+
+    OMP_NUM_THREADS=1 python benchmarks/environment.py
+"""
+
+import argparse
+import json
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from loco_drake.files import atomic_path
+from loco_drake.gaits import parse_label
+from loco_drake.generation.generate import generate_motions
+from loco_drake.generation.pretrained import pretrained_motion_model
+from loco_drake.models.plant import AddRobotPlant, ConfigureSimulator, PlantConfig
+from loco_drake.models.robots import get_robot
+from loco_drake.systems.observation import observe
+from loco_drake.systems.plan import PLAN_DT, Plan, plan_from_motion
+from loco_drake.systems.retiming import joint_limits
+from loco_drake.systems.toppra_smoother import smooth_plan
+from loco_drake.systems.tracking_reward import reward_terms
+from loco_drake.tracking.environment import EnvironmentConfig, TrackingEnv
+from loco_drake.tracking.terminations import TerminationConfig, is_lost
+
+ROBOT = "go2"
+# What is measured, and its name in the JSON file.
+ROWS = {
+    "environment": "environment",
+    "bare plant, same episodes": "plant",
+    "bare plant, standing": "standing_plant",
+}
+
+
+def make_plans() -> list[Plan]:
+    """Returns references such as training uses."""
+    robot = get_robot(ROBOT)
+    limits = joint_limits(robot)
+    model = pretrained_motion_model(ROBOT)
+    return [
+        smooth_plan(robot, plan_from_motion(robot, motion), limits)
+        for gait in ("dog-pace", "dog-trot")
+        for motion in generate_motions(model, parse_label(gait), 6.0, range(4))
+    ]
+
+
+@dataclass
+class Episode:
+    """What the environment did: ``steps`` from sample ``first`` of a plan."""
+
+    plan: Plan
+    first: int
+    steps: int = 0
+
+
+class Environment:
+    """Steps the environment and remembers its episodes."""
+
+    def __init__(self, plans: list[Plan], config: PlantConfig) -> None:
+        self._env = TrackingEnv(plans, EnvironmentConfig(robot=ROBOT, plant=config))
+        self.resets = 0
+        self.reset_seconds = 0.0
+        self._seed: int | None = 0
+
+    @property
+    def plan(self) -> Plan:
+        """One of the plans."""
+        return self._env.plans[0]
+
+    def run(self, steps: int) -> tuple[float, list[Episode]]:
+        """Does ``steps``; returns the seconds they took and the episodes."""
+        action = np.zeros(12, np.float32)
+        start = time.process_time()
+        episodes = [self._reset()]
+        for _ in range(steps):
+            *_, terminated, truncated, _ = self._env.step(action)
+            episodes[-1].steps += 1
+            if terminated or truncated:
+                episodes.append(self._reset())
+        return time.process_time() - start, episodes
+
+    def _reset(self) -> Episode:
+        start = time.process_time()
+        _, info = self._env.reset(seed=self._seed)
+        self._seed = None
+        self.reset_seconds += time.process_time() - start
+        self.resets += 1
+        return Episode(self._env.plans[info["plan"]], info["sample"])
+
+
+class BarePlant:
+    """Steps a diagram of plant and scene graph."""
+
+    def __init__(self, config: PlantConfig) -> None:
+        self._robot = get_robot(ROBOT)
+        builder = DiagramBuilder()
+        self._plant, _, instance = AddRobotPlant(builder, self._robot, config)
+        self._simulator = Simulator(builder.Build())
+        ConfigureSimulator(self._simulator, config)
+        self._context = self._plant.GetMyMutableContextFromRoot(
+            self._simulator.get_mutable_context()
+        )
+        self._targets = self._plant.get_desired_state_input_port(instance).FixValue(
+            self._context, np.zeros(24)
+        )
+
+    def follow(self, episodes: list[Episode]) -> float:
+        """Does what the environment did; returns the seconds spent stepping."""
+        return sum(self._follow(episode) for episode in episodes)
+
+    def _follow(self, episode: Episode) -> float:
+        robot, plan, first = self._robot, episode.plan, episode.first
+        self._restart(np.concatenate((plan.q[first], plan.v[first])))
+        samples = np.minimum(first + 1 + np.arange(episode.steps), len(plan) - 1)
+        forward = (robot.kd * plan.v[samples, 6:] + plan.torques[samples]) / robot.kp
+        return self._advance(plan.q[samples, 7:] + forward)
+
+    def stand(self, steps: int) -> float:
+        """Stands still for ``steps``; returns the seconds they took."""
+        robot = self._robot
+        height = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, robot.stand_height]
+        self._restart(np.concatenate((height, robot.stand_joints, np.zeros(18))))
+        return self._advance(np.tile(robot.stand_joints, (steps, 1)))
+
+    def _restart(self, state: NDArray[np.float64]) -> None:
+        self._simulator.get_mutable_context().SetTime(0.0)
+        self._plant.SetPositionsAndVelocities(self._context, state)
+        self._simulator.Initialize()
+
+    def _advance(self, targets: NDArray[np.float64]) -> float:
+        desired = np.hstack((targets, np.zeros_like(targets)))
+        start = time.process_time()
+        for step, value in enumerate(desired, start=1):
+            self._targets.GetMutableData().get_mutable_value().set_value(value)
+            self._simulator.AdvanceTo(step * PLAN_DT, interruptible=False)
+        return time.process_time() - start
+
+
+def parts(plan: Plan, calls: int = 500) -> dict[str, float]:
+    """Returns the seconds that the environment's own computations take, once each."""
+    robot, termination = get_robot(ROBOT), TerminationConfig()
+    middle = len(plan) // 2
+    time_now = plan.start_time + middle * PLAN_DT
+    state = plan.state[middle] + 0.01
+    action = np.zeros(12)
+    functions: dict[str, Callable[[], object]] = {
+        "observe": lambda: observe(robot, plan, time_now, state, action),
+        "reward_terms": lambda: reward_terms(robot, plan, time_now, state),
+        "is_lost": lambda: is_lost(robot, termination, state, plan.state[middle]),
+    }
+    seconds = {}
+    for name, function in functions.items():
+        start = time.process_time()
+        for _ in range(calls):
+            function()
+        seconds[name] = (time.process_time() - start) / calls
+    return seconds
+
+
+def main() -> None:
+    """Measures and prints."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--steps", type=int, default=200, help="in each turn")
+    parser.add_argument("--turns", type=int, default=15)
+    parser.add_argument("--contact", default="similar")
+    parser.add_argument("--time-step", type=float, default=0.01, help="s")
+    parser.add_argument("--json", type=Path, help="where to write the figures")
+    arguments = parser.parse_args()
+
+    config = PlantConfig(contact=arguments.contact, time_step=arguments.time_step)
+    environment, bare = Environment(make_plans(), config), BarePlant(config)
+    steps = arguments.steps
+    bare.follow(environment.run(100)[1])  # warm
+    environment.resets, environment.reset_seconds = 0, 0.0
+
+    seconds: dict[str, list[float]] = {name: [] for name in ROWS}
+    for _ in range(arguments.turns):
+        own, episodes = environment.run(steps)
+        for name, spent in zip(
+            ROWS, (own, bare.follow(episodes), bare.stand(steps)), strict=True
+        ):
+            seconds[name].append(spent)
+
+    figures = {}
+    print(f"{'':26} steps/s  ms a step  ratio")
+    for name, key in ROWS.items():
+        each = statistics.median(seconds[name]) / steps
+        turns = zip(seconds[name], seconds["environment"], strict=True)
+        ratio = statistics.median(theirs / own for theirs, own in turns)
+        print(f"{name:26} {1 / each:7.0f} {1e3 * each:10.3f} {ratio:6.3f}")
+        figures[f"{key}_steps_per_second"] = 1 / each
+        figures[f"ratio_to_{key}"] = ratio
+    resets = 1e3 * environment.reset_seconds / steps / arguments.turns
+    print("\nof the environment's step:")
+    named = {f"resets ({environment.resets})": resets}
+    named |= {name: 1e3 * each for name, each in parts(environment.plan).items()}
+    for name, milliseconds in named.items():
+        print(f"{name:26} {milliseconds:18.3f}")
+    if arguments.json is not None:
+        with atomic_path(arguments.json) as temporary:
+            temporary.write_text(json.dumps(figures, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
