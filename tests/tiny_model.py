@@ -6,6 +6,7 @@ from loco_drake.generation.features import JOINTS, SIZE
 from loco_drake.generation.generator import Generator, GeneratorConfig
 from loco_drake.generation.motion_model import MotionModel
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig
+from loco_drake.generation.train_tokenizer import LearningTokenizer
 from loco_drake.models.robots import get_robot
 
 
@@ -17,17 +18,18 @@ def make_tiny_model() -> MotionModel:
             width=16, depth=2, frame_width=8, books=2, book_size=16
         )
         tokenizer = Tokenizer(config)
+        learning = LearningTokenizer(tokenizer)
         statistics = torch.randn(1000, SIZE) * 0.1
         statistics[:, JOINTS] += torch.tensor(get_robot("go2").stand_joints).float()
         statistics[:, 3] += 1.0
         tokenizer.set_statistics(statistics)
-        tokenizer.train()
         for _ in range(2):
             frames = statistics[torch.randint(1000, (16, 32))]
-            tokenizer(frames, torch.zeros(16, dtype=torch.long))
+            learning(frames, torch.zeros(16, dtype=torch.long))
+        learning.finish()
         generator = Generator(
             GeneratorConfig(
-                tokenizer=tokenizer.eval().fingerprint,
+                tokenizer=tokenizer.fingerprint,
                 books=2,
                 book_size=16,
                 frames_per_token=4,

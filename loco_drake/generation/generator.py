@@ -49,9 +49,9 @@ class GeneratorConfig:
     labels: tuple[str, ...]
     window: int = 16
     width: int = 128
-    layers: int = 4
+    layers: int = 3
     heads: int = 4
-    dropout: float = 0.2
+    dropout: float = 0.1
 
 
 # Keys and values of each layer for the times seen so far.

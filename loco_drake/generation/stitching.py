@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import convolve
 
 from loco_drake.errors import InputError
 from loco_drake.generation.features import CONTACTS, JOINTS
@@ -18,16 +19,21 @@ from loco_drake.motion import FPS
 
 Array = NDArray[np.float64]
 
+STRIDE = 25  # frames over which pace is averaged
 BLEND = 8  # frames in which one clip goes over into another
 SHORTEST_STAY = 20  # frames in a clip between two blends
 EXITS = 10  # frames before and after the wished-for one at which a clip may be left
 GREED = 0.1  # spread of the costs among which a transition is drawn
-TO_THE_END = 0.5  # probability of staying in a clip to its end
-EVENNESS = 0.5  # cost of entering where it was played as often as on average
+TO_THE_END = 0.7  # probability of staying in a clip to its end
+PACE_WEIGHT = 3.0  # of speed and turning over a stride, in standard deviations
+EVENNESS = 2.0  # cost of entering where it was played as often as on average
 
 
 class Stitcher:
     """Makes long motions of clips of one robot and one label.
+
+    It remembers which frames it has played, and prefers others: otherwise clips that
+    slow down would lead from slow to slower, and all motion end there.
 
     Args:
         clips: those of up to 2 BLEND + SHORTEST_STAY frames are left out.
@@ -44,33 +50,28 @@ class Stitcher:
                 f"frames of each label; those of {clips[0].label} are shorter."
             )
         # A frame is described by pose and speeds, in standard deviations.
-        every = np.concatenate(self._clips)
-        speeds = [np.gradient(c[:, JOINTS], 1 / FPS, axis=0) for c in self._clips]
-        described = np.concatenate((every, np.concatenate(speeds)), axis=1)
-        spread = np.maximum(described.std(axis=0), 1e-3)
-        spread[CONTACTS] = 2.0  # poses nearly say it already
-        self._frames = described / spread
+        described = np.concatenate([_described(clip) for clip in self._clips])
+        self._frames = described / np.maximum(described.std(axis=0), 1e-3)
+        self._frames[:, -3:] *= PACE_WEIGHT
         lengths = [len(c) for c in self._clips]
         self._first = np.cumsum([0, *lengths[:-1]])  # row in _frames of a clip's first
         self._clip_of = np.repeat(np.arange(len(lengths)), lengths)
         self._frame_of = np.concatenate([np.arange(n) for n in lengths])
         left = np.repeat(lengths, lengths) - self._frame_of
         self._enterable = np.flatnonzero(left > 2 * BLEND + SHORTEST_STAY)
+        self._played = np.zeros(len(described))  # how often each frame was, so far
 
     def __call__(self, frames: int, random: np.random.Generator) -> Array:
         """Returns the features of a motion of ``frames`` frames, shape (frames, SIZE).
 
-        It begins anywhere in a clip. Frames that were played less are preferred:
-        otherwise clips that slow down would lead from slow to slower, and all motion
-        end there.
+        It begins anywhere in a clip.
         """
-        played = np.zeros(len(self._frames))
         row = int(random.choice(self._enterable))
         clip, frame = int(self._clip_of[row]), int(self._frame_of[row])
         parts: list[Array] = []
         made = 0
         while made < frames:
-            leave, (next_clip, enter) = self._transition(clip, frame, played, random)
+            leave, (next_clip, enter) = self._transition(clip, frame, random)
             weight = (np.arange(1, BLEND + 1) / (BLEND + 1))[:, None]
             a = self._clips[clip][leave : leave + BLEND]
             b = self._clips[next_clip][enter : enter + BLEND]
@@ -79,12 +80,12 @@ class Stitcher:
             parts += [self._clips[clip][frame:leave], blend]
             made += leave - frame + BLEND
             start = self._first[clip]
-            played[start + frame : start + leave] += 1
+            self._played[start + frame : start + leave] += 1
             clip, frame = next_clip, enter + BLEND
         return np.concatenate(parts)[:frames]
 
     def _transition(
-        self, clip: int, frame: int, played: Array, random: np.random.Generator
+        self, clip: int, frame: int, random: np.random.Generator
     ) -> tuple[int, tuple[int, int]]:
         """Returns where to leave a clip that is at ``frame``, and where to go on."""
         earliest, latest = frame + SHORTEST_STAY, len(self._clips[clip]) - BLEND
@@ -99,9 +100,10 @@ class Stitcher:
         a, b = self._frames[rows], self._frames[self._enterable]
         cost = (a * a).sum(axis=1)[:, None] + (b * b).sum(axis=1) - 2 * a @ b.T
         cost = np.maximum(cost, 0.0) / a.shape[1]
-        total = np.concatenate(([0.0], np.cumsum(played)))
+        total = np.concatenate(([0.0], np.cumsum(self._played)))
         ahead = total[self._enterable + SHORTEST_STAY] - total[self._enterable]
-        cost += EVENNESS * ahead / (SHORTEST_STAY * max(played.mean(), 1e-9))
+        # Nothing is worn out after one play: the mean is counted as one more.
+        cost += EVENNESS * ahead / (SHORTEST_STAY * (1 + self._played.mean()))
         # To go on where one is would be no transition.
         same = self._clip_of[self._enterable] == clip
         near = np.abs(self._frame_of[self._enterable] - exits[:, None]) < SHORTEST_STAY
@@ -116,3 +118,13 @@ class Stitcher:
             int(self._clip_of[row]),
             int(self._frame_of[row]),
         )
+
+
+def _described(clip: Array) -> Array:
+    """Returns pose, speeds of the joints, and the pace over a stride, (T, 33)."""
+    pose, pace = clip[:, : CONTACTS.start], clip[:, :3]
+    speeds = np.gradient(clip[:, JOINTS], 1 / FPS, axis=0)
+    kernel = np.ones((STRIDE, 1))
+    known = convolve(np.ones_like(pace), kernel, mode="same", method="direct")
+    mean = convolve(pace, kernel, mode="same", method="direct") / known
+    return np.concatenate((pose, speeds, mean), axis=1)

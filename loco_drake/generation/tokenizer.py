@@ -1,7 +1,8 @@
 """Motion features to tokens and back: a causal VQ-VAE with residual codebooks.
 
-van den Oord et al. 2017 (VQ-VAE); Zeghidour et al. 2021 (residual quantization,
-codebooks by exponential moving averages, dead codes taken from the batch).
+van den Oord et al. 2017 (VQ-VAE); Zeghidour et al. 2021 (residual quantization).
+How the codebooks are learned is in :mod:`loco_drake.generation.train_tokenizer`: the
+library that does it takes seconds to import, which running the networks need not.
 """
 
 import math
@@ -12,7 +13,6 @@ from typing import Any
 
 import torch
 from torch import Tensor, nn
-from vector_quantize_pytorch import ResidualVQ
 
 from loco_drake.errors import InputError
 from loco_drake.generation.features import CONTACTS, SIZE
@@ -46,7 +46,7 @@ class TokenizerConfig:
 
 
 class Tokenizer(nn.Module):
-    """The VQ-VAE: encoder, residual quantizer, decoder, feature statistics.
+    """The VQ-VAE: encoder, residual codebooks, decoder, feature statistics.
 
     Times of a token are ``frames_per_token`` frames. Encoder and decoder are causal:
     the codes of a token depend on no later frame, and frames on no later token.
@@ -70,16 +70,10 @@ class Tokenizer(nn.Module):
         self.encoder_in = nn.Linear(SIZE * frames, width)
         self.encoder = nn.Sequential(*(ConvBlock(width) for _ in range(config.depth)))
         self.encoder_out = nn.Linear(width, config.code_size)
-        self.quantizer = ResidualVQ(
-            dim=config.code_size,
-            num_quantizers=config.books,
-            codebook_size=config.book_size,
-            kmeans_init=True,
-            kmeans_iters=20,
-            decay=0.98,
-            threshold_ema_dead_code=1,
-            commitment_weight=1.0,
+        self.register_buffer(
+            "codebooks", torch.zeros(config.books, config.book_size, config.code_size)
         )
+        self.codebooks: Tensor
         self.decoder_in = nn.Linear(config.code_size, width)
         decoder = [ConvBlock(width) for _ in range(config.depth)]
         smooth = [ConvBlock(config.frame_width, kernel=5) for _ in range(2)]
@@ -100,7 +94,7 @@ class Tokenizer(nn.Module):
         self.mean[CONTACTS], self.std[CONTACTS] = 0.5, 0.5
 
     def embed(self, features: Tensor, robot: Tensor) -> Tensor:
-        """Returns what the quantizer is given: (B, T, SIZE) -> (B, T / f, code_size).
+        """Returns vectors to be quantized: (B, T, SIZE) -> (B, T / f, code_size).
 
         Args:
             features: frames; T must be a multiple of ``frames_per_token``.
@@ -115,9 +109,13 @@ class Tokenizer(nn.Module):
 
     def encode(self, features: Tensor, robot: Tensor) -> Tensor:
         """Returns codes (B, T / frames_per_token, books); see :meth:`embed`."""
-        _, codes, _ = self.quantizer(self.embed(features, robot))
-        indices: Tensor = codes
-        return indices
+        residual = self.embed(features, robot)
+        codes = []
+        for book in self.codebooks:
+            nearest = torch.cdist(residual, book[None]).argmin(dim=-1)
+            codes.append(nearest)
+            residual = residual - book[nearest]
+        return torch.stack(codes, dim=-1)
 
     def decode(self, codes: Tensor, robot: Tensor) -> Tensor:
         """Returns features (B, n * frames_per_token, SIZE), contacts as probabilities.
@@ -132,9 +130,7 @@ class Tokenizer(nn.Module):
 
     def lookup(self, codes: Tensor) -> Tensor:
         """Returns the sum of the books' vectors: (B, n, books) -> (B, n, code_size)."""
-        books = self.quantizer.codebooks  # (books, book_size, code_size)
-        index = torch.arange(len(books))
-        total: Tensor = books[index, codes].sum(dim=-2)
+        total: Tensor = self.codebooks[torch.arange(len(self.codebooks)), codes].sum(-2)
         return total
 
     def decode_embedded(self, embedded: Tensor, robot: Tensor) -> Tensor:
@@ -146,15 +142,6 @@ class Tokenizer(nn.Module):
         # Logits of the contacts are left as they are, the rest back in their units.
         scaled = x * self.std + self.mean
         return torch.cat((scaled[..., : CONTACTS.start], x[..., CONTACTS]), dim=-1)
-
-    def forward(self, features: Tensor, robot: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Encodes, quantizes and decodes.
-
-        Returns:
-            Reconstruction with contacts as logits, codes, commitment loss.
-        """
-        embedded, codes, commitment = self.quantizer(self.embed(features, robot))
-        return self.decode_embedded(embedded, robot), codes, commitment.mean()
 
     @property
     def fingerprint(self) -> str:

@@ -27,10 +27,12 @@ from loco_drake.generation.train_tokenizer import clip_tensor
 from loco_drake.generation.training import LoopResult, LoopSettings, train
 from loco_drake.motion import FPS
 
-BATCH = 32  # windows
+BATCH = 24  # windows
 GROWTH = 12  # tokens by which a window grows while a chunk is written
 NO_HISTORY = 0.15  # share of windows that begin a sequence
-STITCHED = 30  # long motions to learn from, for each robot and label
+# Long motions to learn from, for each robot and label: tokens depend on where a
+# motion is cut into them, so that the same clips are worth seeing many times.
+STITCHED = 150
 STITCHED_SECONDS = 20.0  # each
 CORRUPTION = 0.1  # share of input codes replaced, so that mistakes can be mended
 

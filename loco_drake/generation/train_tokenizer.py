@@ -1,4 +1,9 @@
-"""Training of the tokenizer on windows of clips, and its score."""
+"""Training of the tokenizer on windows of clips, and its score.
+
+The codebooks follow exponential moving averages of what they stand for, and codes
+that nothing is near to are taken from the batch anew, both by
+vector-quantize-pytorch.
+"""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -8,8 +13,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn import functional
+from vector_quantize_pytorch import ResidualVQ
 
 from loco_drake.errors import InputError
 from loco_drake.generation.determinism import single_thread
@@ -54,6 +60,46 @@ class TokenizerScore:
     toe_error_rmse_m: float
 
 
+class LearningTokenizer(nn.Module):
+    """A tokenizer and the quantizer that learns its codebooks.
+
+    Args:
+        tokenizer: trained in place; its own codebooks are set by :meth:`finish`.
+    """
+
+    def __init__(self, tokenizer: Tokenizer) -> None:
+        super().__init__()
+        self.tokenizer = tokenizer
+        self.quantizer = ResidualVQ(
+            dim=tokenizer.config.code_size,
+            num_quantizers=tokenizer.config.books,
+            codebook_size=tokenizer.config.book_size,
+            kmeans_init=True,
+            kmeans_iters=20,
+            decay=0.98,
+            threshold_ema_dead_code=1,
+        )
+
+    def forward(self, features: Tensor, robot: Tensor) -> tuple[Tensor, Tensor]:
+        """Encodes, quantizes and decodes features (B, T, SIZE).
+
+        Args:
+            features: frames, whole tokens of them.
+            robot: index of each window's robot, shape (B,).
+
+        Returns:
+            Reconstruction with contacts as logits, and the commitment loss.
+        """
+        embedded = self.tokenizer.embed(features, robot)
+        quantized, _, commitment = self.quantizer(embedded)
+        return self.tokenizer.decode_embedded(quantized, robot), commitment.mean()
+
+    def finish(self) -> Tokenizer:
+        """Returns the tokenizer with the codebooks as they are now."""
+        self.tokenizer.codebooks.copy_(self.quantizer.codebooks)
+        return self.tokenizer.eval()
+
+
 def train_tokenizer(
     library: Library, config: TokenizerConfig, settings: LoopSettings
 ) -> tuple[Tokenizer, LoopResult]:
@@ -71,9 +117,9 @@ def train_tokenizer(
         raise InputError(f"The tokenizer is not to know {', '.join(missing)}.")
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
-        tokenizer = Tokenizer(config)
+        learning = LearningTokenizer(Tokenizer(config))
     frames = np.concatenate([clip.features for clip in clips])
-    tokenizer.set_statistics(torch.tensor(frames, dtype=torch.float32))
+    learning.tokenizer.set_statistics(torch.tensor(frames, dtype=torch.float32))
     toes = Toes([get_robot(name) for name in config.robots])
     sampler = Sampler(clips)
     curves = {clip: CubicSpline(np.arange(len(clip)), clip.features) for clip in clips}
@@ -83,14 +129,15 @@ def train_tokenizer(
         windows = [cut_window(curves[clip], random) for clip in chosen]
         target = torch.tensor(np.stack(windows), dtype=torch.float32)
         robot = torch.tensor([config.robots.index(clip.robot) for clip in chosen])
-        losses = tokenizer_losses(tokenizer, toes, target, robot)
+        losses = tokenizer_losses(learning, toes, target, robot)
         total = sum(
             (WEIGHTS[name] * loss for name, loss in losses.items()), torch.zeros(())
         )
         return total, {name: loss.item() for name, loss in losses.items()}
 
     run = {"network": asdict(config), "weights": WEIGHTS}
-    result = train("tokenizer", tokenizer, loss_of_batch, settings, run)
+    result = train("tokenizer", learning, loss_of_batch, settings, run)
+    tokenizer = learning.finish()
     if not result.stopped:
         info = {"labels": [str(label) for label in library.labels]}
         save_tokenizer(tokenizer, Path(settings.out) / "tokenizer.safetensors", info)
@@ -118,19 +165,19 @@ def cut_window(curve: CubicSpline, random: np.random.Generator) -> Array:
 
 
 def tokenizer_losses(
-    tokenizer: Tokenizer, toes: Toes, target: Tensor, robot: Tensor
+    learning: LearningTokenizer, toes: Toes, target: Tensor, robot: Tensor
 ) -> dict[str, Tensor]:
     """Returns the losses of a batch, unweighted; see :data:`WEIGHTS`.
 
     Args:
-        tokenizer: in training mode its codebooks are updated.
+        learning: in training mode its codebooks are updated.
         toes: of the tokenizer's robots.
         target: features, shape (B, T, SIZE).
         robot: index of each window's robot, shape (B,).
     """
-    output, _, commitment = tokenizer(target, robot)
+    output, commitment = learning(target, robot)
     contacts = output[..., CONTACTS]
-    error = ((output - target) / tokenizer.std)[..., : CONTACTS.start]
+    error = ((output - target) / learning.tokenizer.std)[..., : CONTACTS.start]
     p_target = toes.positions(target, robot)
     p_output = toes.positions(output, robot)
     v_target = toes.velocities(target, p_target, robot)

@@ -35,15 +35,17 @@ def test_the_gait_keeps_its_beat_across_transitions(clips):
     """The stride of 0.5 s stays: contacts 25 frames apart agree, 12 apart do not."""
     stitched = Stitcher(clips)(2000, np.random.default_rng(0))
     down = stitched[:, ft.CONTACTS]
-    assert (down[25:] == down[:-25]).mean() > 0.9
+    assert (down[25:] == down[:-25]).mean() > 0.85
     assert (down[12:] == down[:-12]).mean() < 0.3
 
 
-def test_every_clip_is_used_about_as_much(clips):
+def test_every_clip_is_used(clips):
     """The speeds tell the clips apart."""
-    speed = Stitcher(clips)(4000, np.random.default_rng(0))[:, 0] * GO2.stand_height
+    stitch, random = Stitcher(clips), np.random.default_rng(0)
+    motions = np.concatenate([stitch(1000, random) for _ in range(10)])
+    speed = motions[:, 0] * GO2.stand_height
     for of_clip in (0.6, 0.7, 0.8):
-        assert 0.1 < (np.abs(speed - of_clip) < 0.02).mean() < 0.6
+        assert 0.15 < (np.abs(speed - of_clip) < 0.02).mean() < 0.6
 
 
 def test_the_same_dice_give_the_same_motion(clips):

@@ -9,6 +9,7 @@ from loco_drake.generation.tokenizer import (
     load_tokenizer,
     save_tokenizer,
 )
+from loco_drake.generation.train_tokenizer import LearningTokenizer
 
 TINY = TokenizerConfig(width=16, depth=2, frame_width=8, books=3, book_size=8)
 
@@ -16,11 +17,10 @@ TINY = TokenizerConfig(width=16, depth=2, frame_width=8, books=3, book_size=8)
 @pytest.fixture
 def tokenizer():
     torch.manual_seed(0)
-    net = Tokenizer(TINY)
-    net.train()
+    learning = LearningTokenizer(Tokenizer(TINY))
     for _ in range(2):  # codebooks start from what they are given
-        net(torch.randn(8, 32, SIZE), torch.zeros(8, dtype=torch.long))
-    return net.eval()
+        learning(torch.randn(8, 32, SIZE), torch.zeros(8, dtype=torch.long))
+    return learning.finish()
 
 
 ROBOT = torch.zeros(1, dtype=torch.long)
@@ -32,7 +32,7 @@ def test_codes_are_the_nearest_of_each_residual(tokenizer):
     with torch.no_grad():
         codes = tokenizer.encode(features, ROBOT)
         residual = tokenizer.embed(features, ROBOT)[0].double()
-    books = tokenizer.quantizer.codebooks.double()
+    books = tokenizer.codebooks.double()
     assert codes.shape == (1, 10, TINY.books)
     for book in range(TINY.books):
         for step in range(10):
@@ -41,11 +41,20 @@ def test_codes_are_the_nearest_of_each_residual(tokenizer):
         residual = residual - books[book][codes[0, :, book]]
 
 
-def test_decoder_sees_the_sum_of_the_quantized_residuals(tokenizer):
+def test_the_network_is_the_one_that_was_trained():
+    """Codes and frames against those of the quantizer that learned the codebooks."""
+    torch.manual_seed(0)
+    learning = LearningTokenizer(Tokenizer(TINY))
+    learning(torch.randn(8, 32, SIZE), torch.zeros(8, dtype=torch.long))
+    tokenizer = learning.finish()
+    learning.eval()
     features = torch.randn(1, 24, SIZE)
     with torch.no_grad():
-        output, codes, _ = tokenizer(features, ROBOT)
+        _, expected, _ = learning.quantizer(tokenizer.embed(features, ROBOT))
+        output, _ = learning(features, ROBOT)
+        codes = tokenizer.encode(features, ROBOT)
         decoded = tokenizer.decode(codes, ROBOT)
+    assert torch.equal(codes, expected)
     torch.testing.assert_close(
         decoded[..., : CONTACTS.start], output[..., : CONTACTS.start]
     )
