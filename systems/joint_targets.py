@@ -10,7 +10,7 @@ from loco_drake.models.robots import Robot
 
 from .plan import PLAN_DT, standing_plan
 
-ACTION_SCALE = 0.25  # rad per unit of action, as in legged_gym and BeyondMimic
+ACTION_SCALE = 0.15  # rad per unit of action: 15 Nm on both robots
 
 
 class JointTargets(LeafSystem):

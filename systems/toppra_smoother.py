@@ -107,6 +107,9 @@ class ToppraSmoother(LeafSystem):
         return progress
 
     def _initialize(self, context: Context, state: State) -> EventStatus:
+        # A clone of a context that has run goes on; SetDefaultContext starts anew.
+        if self._get(context).started:
+            return EventStatus.DidNothing()
         raw = self._plan_in.Eval(context)
         now = context.get_time()
         rest = _Progress(standing_plan(self._robot, now))

@@ -59,16 +59,24 @@ class Recorder:
         """The root context."""
         return self.simulator.get_mutable_context()
 
-    def subsystem_context(self, name: str) -> Context:
-        """Returns the context of the locomotion diagram's subsystem ``name``."""
-        system = self.locomotion.GetSubsystemByName(name)
-        return system.GetMyMutableContextFromRoot(self.context)
+    def start(self, *, gait: str | None = None, seed: int = 0) -> None:
+        """Puts the clock to 0, the robot on its plan and empties the logs.
 
-    def start(self) -> None:
-        """Puts the clock to 0, the robot on its plan and empties the logs."""
+        Args:
+            gait: of a generated reference, instead of the scenario's.
+            seed: of a generated reference, used with ``gait``.
+        """
         self._fell = False
         self.simulator.clear_monitor()
+        self.diagram.SetDefaultContext(self.context)
         self.context.SetTime(0.0)
+        if gait is not None:
+            generator = self.locomotion.GetSubsystemByName("reference")
+            generator.SetReference(
+                generator.GetMyMutableContextFromRoot(self.context),
+                gait=gait,
+                seed=seed,
+            )
         StartOnPlan(self.simulator, self.locomotion)
         for log in self._logs.values():
             log.FindMutableLog(self.context).Clear()

@@ -37,9 +37,9 @@ class PpoConfig:
     gae_lambda: float = 0.95
     clip: float = 0.2
     actor_rate: float = 5e-4
-    target_kl: float = 0.012
+    target_kl: float = 0.02
     critic_rate: float = 1e-3
-    log_std: float = -1.5
+    log_std: float = -0.7
     hidden: list[int] = field(default_factory=lambda: [256, 128])
 
 
@@ -61,7 +61,7 @@ class ScaleReward(VecEnvWrapper):
 
 
 class AdaptivePPO(PPO):
-    """PPO whose actor's learning rate keeps the KL divergence of updates at a target."""
+    """PPO whose actor learns at the rate that gives updates the target divergence."""
 
     target: float
     rate: float

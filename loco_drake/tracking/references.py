@@ -1,13 +1,26 @@
 """The plans that a tracker is trained on: smoothed once, before the episodes."""
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from loco_drake.errors import InputError
+from loco_drake.gaits import parse_label
+from loco_drake.generation.generate import generate_motions
+from loco_drake.generation.pretrained import pretrained_motion_model
 from loco_drake.models.robots import Robot
-from loco_drake.motion import load_motion
+from loco_drake.motion import Motion, load_motion
 from loco_drake.systems.plan import Plan, plan_from_motion
 from loco_drake.systems.retiming import joint_limits
 from loco_drake.systems.toppra_smoother import smooth_plan
+
+
+def smooth_motions(robot: Robot, motions: Iterable[Motion]) -> list[Plan]:
+    """Returns motions as plans, re-timed by the smoother."""
+    limits = joint_limits(robot)
+    return [
+        smooth_plan(robot, plan_from_motion(robot, motion), limits)
+        for motion in motions
+    ]
 
 
 def load_references(robot: Robot, folder: Path) -> list[Plan]:
@@ -19,11 +32,35 @@ def load_references(robot: Robot, folder: Path) -> list[Plan]:
     paths = sorted(Path(folder).glob("*.npz"))
     if not paths:
         raise InputError(f"There are no Motion files (*.npz) in {str(folder)!r}.")
-    limits = joint_limits(robot)
-    plans = []
-    for path in paths:
-        motion = load_motion(path)
+    motions = [load_motion(path) for path in paths]
+    for path, motion in zip(paths, motions, strict=True):
         if motion.robot != robot.name:
             raise InputError(f"{path} is of {motion.robot}, not of {robot.name}.")
-        plans.append(smooth_plan(robot, plan_from_motion(robot, motion), limits))
-    return plans
+    return smooth_motions(robot, motions)
+
+
+def generate_references(
+    robot: Robot, labels: Sequence[str], *, count: int, seconds: float, seed: int
+) -> list[Plan]:
+    """Returns plans that the shipped motion model writes, re-timed by the smoother.
+
+    Args:
+        robot: the robot.
+        labels: gait labels.
+        count: plans of each.
+        seconds: of each plan.
+        seed: of the first plan of each label; the others follow on it.
+
+    Raises:
+        InputError: if the model does not know the robot or a label.
+    """
+    model = pretrained_motion_model(robot.name)
+    seeds = range(seed, seed + count)
+    return smooth_motions(
+        robot,
+        [
+            motion
+            for label in labels
+            for motion in generate_motions(model, parse_label(label), seconds, seeds)
+        ],
+    )

@@ -72,6 +72,8 @@ class WorkerVecEnv(VecEnv):
         seed: of the environments' own randomness.
     """
 
+    render_mode: str | None = None  # VecEnv asks for it
+
     def __init__(
         self,
         plans: list[Plan],

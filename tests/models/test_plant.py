@@ -187,7 +187,7 @@ def test_desired_velocity_folded_into_the_position_is_the_same_pd():
     q_d = robot.stand_joints + rng.uniform(-0.1, 0.1, 12)
     v_d = rng.uniform(-1.0, 1.0, 12)
     folded = q_d + robot.kd / robot.kp * v_d
-    gains = (50.0, 1.5)
+    gains = (robot.kp[0], robot.kd[0])
     q, v = hanging_robot("similar", gains, (q_d, v_d))
     q_f, v_f = hanging_robot("similar", gains, (folded, np.zeros(12)))
     np.testing.assert_allclose(q_f, q, atol=1e-9)

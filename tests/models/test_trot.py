@@ -23,15 +23,15 @@ def test_trot_is_periodic_and_diagonal(name):
 def test_targets_lead_by_the_weight():
     """At the start FR and RL carry all: m g / 2 on arms known from the stance.
 
-    16.085 kg x 9.81 / 2 = 78.9 N a leg; over kp = 50 Nm/rad that is .151 rad on the hip
-    (arm .0955 m), none on the thigh (toe below) and .2525 on the calf (.213 sin .85).
+    16.085 kg x 9.81 / 2 = 78.9 N a leg; over kp = 100 Nm/rad that is .0753 rad on the
+    hip (arm .0955 m), none on the thigh (toe below), .1263 on the calf (.213 sin .85).
     """
     robot = get_robot("go2")
     times = np.linspace(0.0, 3.0, 151)
     joints = trot_joints(robot, times, speed=0.0, lift=0.0)
     lead = (joints[0] - robot.stand_joints).reshape(4, 3)
-    np.testing.assert_allclose(lead[1], [0.1507, 0.0, 0.2525], atol=1e-4)
-    np.testing.assert_allclose(lead[2], [-0.1507, 0.0, 0.2525], atol=1e-4)
+    np.testing.assert_allclose(lead[1], [0.0753, 0.0, 0.1263], atol=1e-4)
+    np.testing.assert_allclose(lead[2], [-0.0753, 0.0, 0.1263], atol=1e-4)
     np.testing.assert_allclose(lead[[0, 3]], 0.0, atol=1e-12)
 
 

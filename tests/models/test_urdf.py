@@ -194,8 +194,8 @@ def test_gains_and_rotors_are_in_the_model(models):
     for index in plant.GetJointActuatorIndices():
         actuator = plant.get_joint_actuator(index)
         assert actuator.has_controller()
-        assert actuator.get_controller_gains().p == 50.0
-        assert actuator.get_controller_gains().d == 1.5
+        assert actuator.get_controller_gains().p == 100.0
+        assert actuator.get_controller_gains().d == 2.0
     assert np.all(robot.reflected_inertia > 0.004)
     assert np.all(robot.reflected_inertia < 0.011)
 

@@ -26,9 +26,9 @@ def test_targets_are_the_next_sample_the_action_and_the_feed_forward(go2, trot):
     diagram.GetInputPort("action").FixValue(context, action)
     simulator.AdvanceTo(20.5 * PLAN_DT)
     desired = diagram.GetOutputPort("desired_state").Eval(context)
-    # The last sampling was at sample 20; 50 Nm/rad and 1.5 Nm s/rad are the Go2's.
+    # The last sampling was at sample 20; 100 Nm/rad and 2 Nm s/rad are the Go2's.
     expected = trot.q[21, 7:] + ACTION_SCALE * action
-    expected += (1.5 * trot.v[21, 6:] + trot.torques[21]) / 50
+    expected += (2 * trot.v[21, 6:] + trot.torques[21]) / 100
     np.testing.assert_allclose(desired[:12], expected, atol=1e-12)
     np.testing.assert_array_equal(desired[12:], 0)
     np.testing.assert_array_equal(diagram.GetOutputPort("action").Eval(context), action)

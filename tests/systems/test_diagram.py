@@ -1,0 +1,169 @@
+import numpy as np
+import pytest
+import torch
+from pydrake.systems.analysis import Simulator
+
+from loco_drake.errors import InputError
+from loco_drake.motion import save_motion
+from loco_drake.systems.actor import Actor, ActorConfig, save_actor
+from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
+from loco_drake.systems.scenario import (
+    ExternalAction,
+    GeneratedReference,
+    LoadScenario,
+    MotionReference,
+    PlanReference,
+    Scenario,
+    TrainedPolicy,
+)
+from tests.synthetic_motion import synthetic_motion
+
+
+@pytest.fixture(scope="module")
+def weights(tmp_path_factory):
+    """A policy that knows nothing, for what does not depend on how well it does."""
+    path = tmp_path_factory.mktemp("weights") / "policy.safetensors"
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(0)
+        save_actor(Actor(ActorConfig(robot="go2", labels=["dog-trot"])), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def generated(weights):
+    """The whole diagram: generator, smoother, policy, plant."""
+    return MakeLocomotionDiagram(
+        Scenario(
+            reference=GeneratedReference(gait="dog-pace", seed=1),
+            policy=TrainedPolicy(weights=weights),
+        )
+    )
+
+
+def states(diagram, times):
+    simulator = Simulator(diagram)
+    StartOnPlan(simulator)
+    port = diagram.GetOutputPort("state")
+    result = []
+    for time in times:
+        simulator.AdvanceTo(time)
+        result.append(port.Eval(simulator.get_context()).copy())
+    return np.array(result)
+
+
+def test_ports_and_systems_have_names(generated):
+    inputs = [generated.get_input_port(i).get_name() for i in range(1)]
+    assert inputs == ["gait"]
+    for name in ("plan", "plan_state", "path_time", "state", "observation", "action"):
+        assert generated.HasOutputPort(name)
+    assert generated.HasOutputPort("reward_terms")
+    assert generated.HasOutputPort("net_actuation")
+    for name in ("plant", "scene_graph", "reference", "smoother", "joint_targets"):
+        assert generated.GetSubsystemByName(name).get_name() == name
+
+
+def test_the_robot_starts_where_its_plan_starts(generated):
+    simulator = Simulator(generated)
+    StartOnPlan(simulator)
+    context = simulator.get_context()
+    plan = generated.GetOutputPort("plan").Eval(context)
+    state = generated.GetOutputPort("state").Eval(context)
+    np.testing.assert_allclose(state, plan.state[0], atol=1e-12)
+    assert generated.GetOutputPort("reward_terms").Eval(context).sum() == (
+        pytest.approx(1.0)
+    )
+
+
+def test_the_same_context_gives_the_same_states(generated):
+    times = [0.5, 1.3]
+    np.testing.assert_array_equal(states(generated, times), states(generated, times))
+
+
+def test_a_cloned_context_goes_the_same_way(generated):
+    simulator = Simulator(generated)
+    StartOnPlan(simulator)
+    simulator.AdvanceTo(0.33)
+    clone = Simulator(generated, simulator.get_context().Clone())
+    simulator.AdvanceTo(1.5)
+    port = generated.GetOutputPort("state")
+    first = port.Eval(simulator.get_context()).copy()
+    clone.AdvanceTo(1.5)
+    np.testing.assert_array_equal(port.Eval(clone.get_context()), first)
+    np.testing.assert_array_equal(port.Eval(simulator.get_context()), first)
+
+
+def test_the_plan_can_come_from_a_motion_file(tmp_path, weights):
+    motion = synthetic_motion("dog-trot", 2.0, 0.5)
+    save_motion(motion, tmp_path / "trot.npz")
+    diagram = MakeLocomotionDiagram(
+        Scenario(
+            reference=MotionReference(path=tmp_path / "trot.npz"),
+            policy=TrainedPolicy(weights=weights),
+        )
+    )
+    simulator = Simulator(diagram)
+    StartOnPlan(simulator)
+    simulator.AdvanceTo(0.4)
+    wanted = diagram.GetOutputPort("plan_state").Eval(simulator.get_context())
+    np.testing.assert_allclose(wanted[7:19], motion.joint_positions[20], atol=1e-9)
+
+
+def test_an_open_action_port_drives_the_joints():
+    diagram = MakeLocomotionDiagram(
+        Scenario(reference=PlanReference(), smoother=None, policy=ExternalAction())
+    )
+    simulator = Simulator(diagram)
+    context = simulator.get_mutable_context()
+    action = np.zeros(12)
+    action[2::3] = 0.4
+    port = diagram.GetInputPort("action").FixValue(context, np.zeros(12))
+    StartOnPlan(simulator)
+    simulator.AdvanceTo(1.0)
+    before = diagram.GetOutputPort("state").Eval(context)[9:19:3].copy()
+    port.GetMutableData().get_mutable_value().set_value(action)
+    simulator.AdvanceTo(2.0)
+    after = diagram.GetOutputPort("state").Eval(context)[9:19:3]
+    # .1 rad more on each calf, less what the weight takes of it.
+    assert (after - before > 0.05).all()
+    assert (after - before < 0.2).all()
+
+
+def test_a_robot_without_weights_says_which_have_some(tmp_path):
+    save_motion(synthetic_motion("dog-trot", 1.0), tmp_path / "x.npz")
+    with pytest.raises(InputError, match="no policy weights for a1"):
+        MakeLocomotionDiagram(Scenario(robot="a1", reference=PlanReference()))
+
+
+def test_a_scenario_is_read_from_yaml(tmp_path):
+    text = """
+    robot: a1
+    plant: {time_step: 0.005}
+    reference: !GeneratedReference {gait: dog-pace, seed: 7}
+    policy: !ExternalAction {}
+    smoother: null
+    """
+    scenario = LoadScenario(data=text, overlay="plant: {friction: 0.5}")
+    assert scenario.robot == "a1"
+    assert scenario.plant.time_step == 0.005
+    assert scenario.plant.friction == 0.5
+    assert scenario.plant.contact == "similar"
+    assert scenario.reference == GeneratedReference(gait="dog-pace", seed=7)
+    assert scenario.policy == ExternalAction()
+    assert scenario.smoother is None
+    path = tmp_path / "scenario.yaml"
+    path.write_text(text)
+    assert LoadScenario(filename=path).robot == "a1"
+
+
+@pytest.mark.parametrize(
+    "text", ["robto: go2", "plant: {time_step: fast}", "reference: !Dance {}", "["]
+)
+def test_a_scenario_with_a_mistake_is_one_sentence(text):
+    with pytest.raises(InputError, match="cannot be read") as error:
+        LoadScenario(data=text)
+    assert "\n" not in str(error.value)
+
+
+def test_a_missing_scenario_file_is_named(tmp_path):
+    with pytest.raises(InputError, match="no scenario file"):
+        LoadScenario(filename=tmp_path / "none.yaml")

@@ -1,0 +1,143 @@
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from loco_drake.errors import InputError
+from loco_drake.gaits import parse_label
+from loco_drake.rotations import quat_error
+from loco_drake.systems.plan import PLAN_DT
+from loco_drake.systems.reference_generator import ReferenceGenerator
+from loco_drake.systems.scenario import GeneratedReference
+from loco_drake.systems.toppra_smoother import ToppraSmoother
+from tests.tiny_model import make_tiny_model
+
+PACE, TROT = parse_label("dog-pace").index, parse_label("dog-trot").index
+
+
+@pytest.fixture(scope="module")
+def model():
+    return make_tiny_model()
+
+
+@pytest.fixture(scope="module")
+def generator(go2, model):
+    return ReferenceGenerator(go2, GeneratedReference(seed=3), model)
+
+
+def plan_at(system, context):
+    return system.GetOutputPort("plan").Eval(context)
+
+
+def samples(system, duration, every=0.25):
+    """Plays ``duration`` s; returns q and v of each sample, by its number."""
+    simulator = Simulator(system)
+    context = simulator.get_context()
+    q, v = {}, {}
+    for time in np.arange(0, duration + 1e-9, every):
+        simulator.AdvanceTo(time)
+        plan = plan_at(system, context)
+        first = round(plan.start_time / PLAN_DT)
+        for k in range(len(plan)):
+            np.testing.assert_array_equal(q.setdefault(first + k, plan.q[k]), plan.q[k])
+            v.setdefault(first + k, plan.v[k])
+    keys = sorted(q)
+    assert keys == list(range(len(keys)))  # no gap, no sample twice
+    return np.array([q[k] for k in keys]), np.array([v[k] for k in keys])
+
+
+def test_plans_are_continuous_across_chunks_and_never_change(generator, model):
+    """Velocities are central differences everywhere, also where chunks meet."""
+    q, v = samples(generator, 5.0)
+    assert len(q) > 5 * model.chunk_frames
+    moving = (q[2:, 4:] - q[:-2, 4:]) / (2 * PLAN_DT)
+    np.testing.assert_allclose(v[1:-1, 3:], moving, atol=1e-6)
+    turning = quat_error(q[:-2, :4], q[2:, :4]) / (2 * PLAN_DT)
+    np.testing.assert_allclose(v[1:-1, :3], turning, atol=1e-6)
+
+
+def test_it_writes_ahead_and_forgets_what_is_long_past(generator):
+    simulator = Simulator(generator)
+    for time in (0.0, 2.0, 9.0):
+        simulator.AdvanceTo(time)
+        plan = plan_at(generator, simulator.get_context())
+        assert plan.end_time >= time + 2.9
+        assert plan.start_time <= max(0.0, time - 0.9)
+        assert plan.open_ended
+    assert plan.start_time >= 9.0 - 3.0
+
+
+def test_it_waits_for_a_smoother_that_is_slow(generator):
+    simulator = Simulator(generator)
+    context = simulator.get_mutable_context()
+    generator.GetInputPort("path_time").FixValue(context, 0.0)
+    simulator.Initialize()
+    before = plan_at(generator, context)
+    simulator.AdvanceTo(5.0)
+    assert plan_at(generator, context) is before
+
+
+def test_a_new_gait_holds_from_the_next_chunk_on(generator):
+    simulator = Simulator(generator)
+    context = simulator.get_mutable_context()
+    port = generator.GetInputPort("gait").FixValue(context, float(TROT))
+    simulator.AdvanceTo(1.0)
+    written = len(plan_at(generator, context))
+    port.GetMutableData().get_mutable_value().set_value([float(PACE)])
+    simulator.AdvanceTo(2.0)
+    labels = plan_at(generator, context).labels
+    assert (labels[:written] == TROT).all()
+    assert (labels[written + 1 :] == PACE).all()
+
+
+def test_seed_and_gait_can_be_set_in_a_context(generator):
+    context = generator.CreateDefaultContext()
+    default = plan_at(generator, context)
+    generator.SetReference(context, gait="dog-trot", seed=4)
+    other = plan_at(generator, context)
+    assert (other.q != default.q).any()
+    generator.SetReference(context, gait="dog-trot", seed=3)
+    np.testing.assert_array_equal(plan_at(generator, context).q, default.q)
+    generator.SetReference(context, gait="dog-pace", seed=3)
+    assert (plan_at(generator, context).labels == PACE).all()
+
+
+def test_a_cloned_context_writes_the_same(go2, model):
+    builder = DiagramBuilder()
+    generator = builder.AddNamedSystem(
+        "generator", ReferenceGenerator(go2, GeneratedReference(), model)
+    )
+    smoother = builder.AddNamedSystem("smoother", ToppraSmoother(go2))
+    builder.Connect(generator.GetOutputPort("plan"), smoother.GetInputPort("plan"))
+    builder.Connect(
+        smoother.GetOutputPort("path_time"), generator.GetInputPort("path_time")
+    )
+    builder.ExportOutput(smoother.GetOutputPort("plan"), "plan")
+    diagram = builder.Build()
+    simulator = Simulator(diagram)
+    simulator.AdvanceTo(1.05)
+    clone = Simulator(diagram, simulator.get_context().Clone())
+    simulator.AdvanceTo(4.0)
+    clone.AdvanceTo(4.0)
+    ours = plan_at(diagram, simulator.get_context())
+    theirs = plan_at(diagram, clone.get_context())
+    assert ours is not theirs
+    np.testing.assert_array_equal(ours.state, theirs.state)
+    assert ours.end_time > 4.9  # neither waits for the other for ever
+
+
+@pytest.mark.parametrize(
+    ("config", "message"),
+    [
+        ({"gait": "dog-waltz"}, "dog-pace, dog-trot"),
+        ({"gait": "horse-walk"}, "not trained on horse-walk"),
+        ({"seed": -1}, "seed must be 0 or more"),
+        ({"duration": 0.0}, "duration must be above 0"),
+        ({"duration": float("nan")}, "duration must be above 0"),
+        ({"temperature": -1.0}, "temperature"),
+        ({"top_p": 0.0}, "top_p"),
+    ],
+)
+def test_bad_input_is_refused(go2, model, config, message):
+    with pytest.raises(InputError, match=message):
+        ReferenceGenerator(go2, GeneratedReference(**config), model)

@@ -1,0 +1,146 @@
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from pydrake.systems.analysis import Simulator
+
+from loco_drake.errors import InputError
+from loco_drake.models.robots import get_robot
+from loco_drake.motion import save_motion
+from loco_drake.systems.diagram import MakeLocomotionDiagram, PlaceOnPlan
+from loco_drake.systems.plan import PLAN_DT
+from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
+from loco_drake.tracking.environment import EnvironmentConfig, TrackingEnv
+from loco_drake.tracking.references import load_references
+from loco_drake.tracking.registration import make_tracking, register
+from tests.synthetic_motion import synthetic_motion
+
+STILL = np.zeros(12, dtype=np.float32)
+
+
+@pytest.fixture
+def env(plans):
+    return TrackingEnv(plans, EnvironmentConfig(position_noise=0, velocity_noise=0))
+
+
+# Actions are normal variates, clipped only far out; the checker would have them in +-1.
+@pytest.mark.filterwarnings("ignore:.*symmetric and normalized space")
+def test_gymnasiums_checker_finds_nothing(plans):
+    check_env(TrackingEnv(plans), skip_render_check=True)
+
+
+def test_gymnasium_makes_it_by_name(tmp_path):
+    save_motion(synthetic_motion("dog-trot", 2.0), tmp_path / "trot.npz")
+    if "loco_drake/Tracking-v0" not in gymnasium.registry:
+        with gymnasium.envs.registration.namespace("loco_drake"):
+            register()
+    env = gymnasium.make("loco_drake/Tracking-v0", references=tmp_path)
+    assert isinstance(env.unwrapped, TrackingEnv)
+    observation, _ = env.reset(seed=0)
+    assert env.observation_space.contains(observation)
+
+
+def test_without_references_it_generates_some():
+    env = make_tracking(labels=["dog-trot"], count=2, seconds=3.0)
+    assert len(env.plans) == 2
+    assert all(abs(plan.end_time - 3.0) < 0.1 for plan in env.plans)
+
+
+def test_an_episode_starts_in_the_plans_state_and_earns_all_there_is(env):
+    _, info = env.reset(options={"plan": 1, "sample": 40})
+    assert info == {"plan": 1, "sample": 40}
+    _, reward, _, _, info = env.step(STILL)
+    assert 0.8 < reward <= 1.0
+    assert reward == pytest.approx(sum(info[name] for name in _terms()))
+
+
+def _terms():
+    return ("joints", "joint_velocities", "toes", "base_pose", "base_velocity")
+
+
+def test_a_step_is_what_the_diagram_does(env, plans):
+    """The same plan and actions, in a simulator of its own, give the same states."""
+    random = np.random.default_rng(0)
+    actions = 0.3 * random.standard_normal((10, 12)).astype(np.float32)
+    env.reset(options={"plan": 0, "sample": 25})
+    ours = [env.step(action)[0] for action in actions]
+
+    diagram = MakeLocomotionDiagram(
+        Scenario(reference=PlanReference(), smoother=None, policy=ExternalAction())
+    )
+    context = diagram.CreateDefaultContext()
+    context.SetTime(25 * PLAN_DT)
+    player = diagram.GetSubsystemByName("reference")
+    player.SetPlan(player.GetMyMutableContextFromRoot(context), plans[0])
+    PlaceOnPlan(diagram, context)
+    simulator = Simulator(diagram, context)
+    for k, action in enumerate(actions):
+        diagram.GetInputPort("action").FixValue(context, action.astype(float))
+        simulator.AdvanceTo((26 + k) * PLAN_DT)
+        theirs = diagram.GetOutputPort("observation").Eval(context)
+        np.testing.assert_allclose(ours[k], theirs, rtol=1e-6, atol=1e-6)
+
+
+def test_time_limits_truncate(plans):
+    env = TrackingEnv(plans, EnvironmentConfig(episode_steps=5))
+    env.reset(seed=0, options={"plan": 0, "sample": 10})
+    ends = [env.step(STILL)[2:4] for _ in range(5)]
+    assert ends == [(False, False)] * 4 + [(False, True)]
+
+
+def test_the_end_of_the_plan_truncates(env, plans):
+    env.reset(seed=0, options={"plan": 0, "sample": len(plans[0]) - 3})
+    assert env.step(STILL)[2:4] == (False, False)
+    assert env.step(STILL)[2:4] == (False, True)
+
+
+def test_falls_terminate(env):
+    """With its legs pulled up the robot drops on its trunk."""
+    env.reset(seed=0, options={"plan": 0, "sample": 0})
+    folded = np.tile([0.0, 10.0, -10.0], 4).astype(np.float32)
+    for _ in range(100):
+        _, _, terminated, truncated, _ = env.step(folded)
+        if terminated or truncated:
+            break
+    assert terminated
+    assert not truncated
+
+
+def test_losing_the_plan_terminates(plans):
+    config = EnvironmentConfig()
+    config.termination.position = 1e-3
+    env = TrackingEnv(plans, config)
+    env.reset(seed=0, options={"plan": 0, "sample": 0})
+    assert any(env.step(STILL)[2] for _ in range(20))
+
+
+def test_same_seed_same_episode_other_seed_another(plans):
+    def episode(seed):
+        env = TrackingEnv(plans)
+        first, info = env.reset(seed=seed)
+        return info, first, [env.step(STILL)[0] for _ in range(5)]
+
+    one, two, other = episode(1), episode(1), episode(2)
+    assert one[0] == two[0]
+    np.testing.assert_array_equal(one[1], two[1])
+    np.testing.assert_array_equal(one[2], two[2])
+    assert (one[1] != other[1]).any()
+
+
+def test_environments_share_a_diagram_but_no_state(plans):
+    config = EnvironmentConfig(position_noise=0, velocity_noise=0)
+    first, second = TrackingEnv(plans, config), TrackingEnv(plans, config)
+    assert first._diagram is second._diagram
+    start, _ = first.reset(options={"plan": 0, "sample": 0})
+    second.reset(options={"plan": 1, "sample": 30})
+    for _ in range(5):
+        second.step(STILL + 1)
+    np.testing.assert_array_equal(first._observe(), start)
+
+
+def test_references_must_be_there_and_of_the_robot(tmp_path):
+    with pytest.raises(InputError, match="no Motion files"):
+        load_references(get_robot("go2"), tmp_path)
+    save_motion(synthetic_motion("dog-trot", 2.0), tmp_path / "trot.npz")
+    with pytest.raises(InputError, match="of go2, not of a1"):
+        load_references(get_robot("a1"), tmp_path)

@@ -1,0 +1,156 @@
+import json
+import os
+import signal
+
+import numpy as np
+import pytest
+import torch
+
+from loco_drake.errors import InputError
+from loco_drake.gaits import parse_label
+from loco_drake.models.robots import get_robot
+from loco_drake.systems.actor import load_actor
+from loco_drake.systems.observation import OBSERVATION_SIZE
+from loco_drake.tracking.checkpoint import load_checkpoint
+from loco_drake.tracking.environment import EnvironmentConfig
+from loco_drake.tracking.ppo import PpoConfig
+from loco_drake.tracking.sampler import PlanSampler
+from loco_drake.tracking.train import TrainingConfig, train_tracker
+from loco_drake.tracking.workers import WorkerVecEnv
+
+TROT, PACE = parse_label("dog-trot").index, parse_label("dog-pace").index
+
+
+def config(steps, **ppo):
+    return TrainingConfig(
+        steps=steps,
+        workers=1,
+        per_worker=2,
+        environment=EnvironmentConfig(episode_steps=20),
+        ppo=PpoConfig(batch=64, minibatch=32, epochs=2, hidden=[16, 16], **ppo),
+    )
+
+
+@pytest.fixture(scope="module")
+def trained(plans, tmp_path_factory):
+    """Two batches, interrupted by Ctrl-C after the second, then two more."""
+    folder = tmp_path_factory.mktemp("tracker")
+
+    def interrupt(progress):
+        if progress.steps >= 128:
+            raise KeyboardInterrupt
+
+    first = train_tracker(plans, config(256), folder, report=interrupt)
+    stopped = load_checkpoint(folder / "checkpoint.safetensors")
+    load_actor(folder / "policy.safetensors", get_robot("go2"))
+    second = train_tracker(plans, config(256), folder, resume=True)
+    ended = load_checkpoint(folder / "checkpoint.safetensors")
+    return folder, first, stopped, second, ended
+
+
+def test_an_interruption_leaves_a_checkpoint_and_a_policy(trained):
+    _, first, (_, header), _, _ = trained
+    assert first["interrupted"]
+    assert first["steps"] == header["state"]["steps"] == 128
+
+
+def test_a_resumed_training_goes_on_to_the_end(trained):
+    _, _, (before, header), second, (after, later) = trained
+    assert not second["interrupted"]
+    assert second["steps"] == later["state"]["steps"] == 256
+    # Two epochs of two minibatches in each of four batches: Adam counts them all.
+    steps = [v for k, v in after.items() if k.endswith("/step")]
+    assert {float(step) for step in steps} == {16.0}
+    counts = [h["state"]["normalizer_count"] for h in (header, later)]
+    assert counts[1] - counts[0] >= 128
+    changed = [
+        name
+        for name, value in before.items()
+        if name.startswith("policy/") and not torch.equal(value, after[name])
+    ]
+    assert len(changed) == sum(name.startswith("policy/") for name in before)
+
+
+def test_what_is_restored_is_what_was_saved(trained, plans, tmp_path):
+    """Nothing left to do: the checkpoint that is written equals the one read."""
+    folder, _, _, _, (tensors, header) = trained
+    for name in ("checkpoint", "policy"):
+        file = f"{name}.safetensors"
+        (tmp_path / file).write_bytes((folder / file).read_bytes())
+    train_tracker(plans, config(256), tmp_path, resume=True)
+    again, same = load_checkpoint(tmp_path / "checkpoint.safetensors")
+    assert same["state"] == header["state"]
+    assert again.keys() == tensors.keys()
+    for name, value in tensors.items():
+        assert torch.equal(value, again[name]), name
+
+
+def test_the_policy_is_the_learners(trained):
+    """The shipped network computes what the checkpoint's weights say."""
+    folder, _, _, _, (tensors, _) = trained
+    actor = load_actor(folder / "policy.safetensors", get_robot("go2"))
+    observation = torch.randn(
+        OBSERVATION_SIZE, generator=torch.Generator().manual_seed(0)
+    )
+    mean = tensors["normalizer/mean"]
+    std = torch.sqrt(tensors["normalizer/variance"] + 1e-8)
+    x = ((observation - mean) / std).clamp(-5, 5).float()
+    for layer in ("mlp_extractor.policy_net.0", "mlp_extractor.policy_net.2"):
+        W, b = (tensors[f"policy/{layer}.{part}"] for part in ("weight", "bias"))
+        x = torch.nn.functional.elu(W @ x + b)
+    W, b = (tensors[f"policy/action_net.{part}"] for part in ("weight", "bias"))
+    with torch.inference_mode():
+        torch.testing.assert_close(actor(observation), W @ x + b, atol=1e-5, rtol=1e-5)
+
+
+def test_progress_is_logged(trained):
+    folder = trained[0]
+    lines = (folder / "progress.jsonl").read_text().splitlines()
+    steps = [json.loads(line)["steps"] for line in lines]
+    assert steps == sorted(steps)
+    assert list(folder.glob("events.out.tfevents.*"))
+
+
+def test_other_networks_cannot_be_resumed(trained, plans):
+    other = config(256)
+    other.ppo.hidden = [8, 8]
+    with pytest.raises(InputError, match="hidden"):
+        train_tracker(plans, other, trained[0], resume=True)
+
+
+def test_nothing_cannot_be_resumed(plans, tmp_path):
+    with pytest.raises(InputError, match="no tracker checkpoint weights"):
+        train_tracker(plans, config(64), tmp_path / "none", resume=True)
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_killed_worker_is_reported(plans):
+    sampler = PlanSampler(plans, 0)
+    workers = WorkerVecEnv(
+        plans, EnvironmentConfig(), sampler, workers=1, per_worker=1, seed=0
+    )
+    try:
+        workers.reset()
+        os.kill(workers._processes[0].pid, signal.SIGKILL)
+        workers._processes[0].join()
+        with pytest.raises(RuntimeError, match="worker process died"):
+            workers.step(np.zeros((1, 12), dtype=np.float32))
+    finally:
+        workers.close()
+
+
+def test_the_sampler_prefers_what_lacks_most(plans):
+    """Trot at .9 lacks .1, pace at .5 lacks .5: five draws in six are a pace."""
+    sampler = PlanSampler(plans, 0)
+    sampler.scores[TROT], sampler.scores[PACE] = 0.9, 0.5
+    draws = np.array([sampler.draw() for _ in range(3000)])
+    share = np.mean([plans[i].labels[0] == PACE for i in draws])
+    assert share == pytest.approx(5 / 6, abs=0.03)
+
+
+def test_scores_follow_what_episodes_return(plans):
+    sampler = PlanSampler(plans, 0)
+    for _ in range(400):
+        sampler.record(0, 0.8)
+    assert sampler.score_by_label()["dog-trot"] == pytest.approx(80, abs=0.1)
+    assert sampler.score_by_label()["dog-pace"] == 0.0
