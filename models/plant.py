@@ -75,7 +75,11 @@ def AddRobotPlant(
     config.check()
     continuous = config.contact == "cenic"
     plant_config = MultibodyPlantConfig(
-        time_step=0.0 if continuous else config.time_step, contact_model="point"
+        time_step=0.0 if continuous else config.time_step,
+        contact_model="point",
+        # With sampled ports the plant steps by an unrestricted update, which would see
+        # targets that are set in the same step only one step later.
+        use_sampled_output_ports=False,
     )
     if not continuous:
         plant_config.discrete_contact_approximation = config.contact
