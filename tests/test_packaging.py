@@ -1,0 +1,172 @@
+"""The wheel holds what the library needs, and works outside the checkout."""
+
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from loco_drake import __version__
+from loco_drake.models.robots import get_robot
+
+ROOT = Path(__file__).parents[1]
+
+
+def python(*arguments, cwd, **environment):
+    """Runs Python in another process; returns what it printed."""
+    process = subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        cwd=cwd,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert process.returncode == 0, process.stderr
+    return process.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """The wheel, built as pip builds it, but without an environment of its own."""
+    folder = tmp_path_factory.mktemp("dist")
+    python("-m", "hatchling", "build", "-t", "wheel", "-d", folder, cwd=ROOT)
+    (path,) = folder.glob("*.whl")
+    return path
+
+
+@pytest.fixture(scope="module")
+def installed(wheel, tmp_path_factory):
+    """A folder into which the wheel is installed.
+
+    A wheel of pure Python with nothing in a .data folder is installed by unpacking it;
+    not every virtual environment has pip.
+    """
+    folder = tmp_path_factory.mktemp("installed")
+    with zipfile.ZipFile(wheel) as archive:
+        assert not [name for name in archive.namelist() if ".data/" in name]
+        archive.extractall(folder)
+    return folder
+
+
+def test_wheel_has_code_models_weights_and_configuration(wheel):
+    """All that is committed below the three source folders is in it."""
+    committed = subprocess.run(
+        ["git", "ls-files", "loco_drake", "systems", "models"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    ).stdout.split()
+    if not committed:
+        pytest.skip("needs a git checkout")
+    links = {"loco_drake/systems", "loco_drake/models"}
+    expected = {
+        name if name.startswith("loco_drake/") else f"loco_drake/{name}"
+        for name in committed
+        if name not in links and (ROOT / name).is_file()
+    }
+    with zipfile.ZipFile(wheel) as archive:
+        found = set(archive.namelist())
+    assert found >= expected
+    for name in (
+        "py.typed",
+        "retargeting/sources/dog.yaml",
+        "models/package.xml",
+        "models/go2/go2.urdf",
+        "models/go2/go2.yaml",
+        "models/a1/a1.urdf",
+        "models/a1/a1.yaml",
+        "models/pretrained/MODEL_CARD.md",
+        "models/pretrained/tokenizer.safetensors",
+        "models/pretrained/generator.safetensors",
+        "models/pretrained/policy_go2.safetensors",
+        "systems/diagram.py",
+    ):
+        assert f"loco_drake/{name}" in found
+
+
+def test_wheel_has_one_package_its_licence_and_no_recordings(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+        size = sum(info.file_size for info in archive.infolist())
+    info = f"loco_drake-{__version__}.dist-info"
+    assert {name.split("/")[0] for name in names} == {"loco_drake", info}
+    assert f"{info}/licenses/LICENSE" in names
+    suffixes = {Path(name).suffix for name in names if not name.startswith(info)}
+    data = {".urdf", ".xml", ".yaml", ".md", ".safetensors"}
+    assert suffixes <= {".py", ".typed", *data}
+    assert size < 20e6
+
+
+def test_source_distribution_holds_the_linked_folders(tmp_path):
+    """From it a wheel can be built: its links were followed."""
+    python("-m", "hatchling", "build", "-t", "sdist", "-d", tmp_path, cwd=ROOT)
+    (path,) = tmp_path.glob("*.tar.gz")
+    names = subprocess.run(
+        ["tar", "-tzf", path], capture_output=True, text=True, check=True
+    ).stdout.split()
+    top = f"loco_drake-{__version__}"
+    for name in (
+        "loco_drake/systems/diagram.py",
+        "loco_drake/models/go2/go2.urdf",
+        "examples/simulate.py",
+        "tests/test_packaging.py",
+        "pyproject.toml",
+        "README.md",
+        "LICENSE",
+    ):
+        assert f"{top}/{name}" in names
+
+
+STEP = """
+import numpy as np
+from pydrake.systems.analysis import Simulator
+
+import loco_drake
+from loco_drake.models.robots import get_robot
+from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
+from loco_drake.systems.scenario import LoadScenario
+
+diagram = MakeLocomotionDiagram(LoadScenario(
+    data="{reference: !PlanReference {}, policy: !ExternalAction {}}"
+))
+simulator = Simulator(diagram)
+diagram.GetInputPort("action").FixValue(simulator.get_mutable_context(), np.zeros(12))
+StartOnPlan(simulator)
+simulator.AdvanceTo(0.5)
+state = diagram.GetOutputPort("state").Eval(simulator.get_context())
+print(loco_drake.__file__)
+print(get_robot("go2").mass, state[6])
+"""
+
+ENTRY_POINTS = """
+from importlib.metadata import distribution, entry_points
+
+(script,) = entry_points(group="console_scripts", name="loco-drake")
+print(script.load()(["--version"]))
+for entry_point in distribution("loco_drake").entry_points:
+    print(entry_point.group, entry_point.name, entry_point.load().__module__)
+"""
+
+
+def test_installed_wheel_simulates_the_go2_outside_the_checkout(installed, tmp_path):
+    """The Go2 has its mass, and stands to within a centimetre after half a second."""
+    printed = python("-c", STEP, cwd=tmp_path, PYTHONPATH=str(installed))
+    file, numbers = printed.splitlines()
+    assert Path(file) == installed / "loco_drake" / "__init__.py"
+    mass, height = map(float, numbers.split())
+    robot = get_robot("go2")
+    assert mass == robot.mass
+    assert height == pytest.approx(robot.stand_height, abs=0.01)
+
+
+def test_entry_points_of_the_installed_wheel_lead_somewhere(installed, tmp_path):
+    printed = python("-c", ENTRY_POINTS, cwd=tmp_path, PYTHONPATH=str(installed))
+    version, status, *entries = printed.splitlines()
+    assert (version, status) == (__version__, "0")
+    assert "console_scripts loco-drake loco_drake.cli.main" in entries
+    assert "gymnasium.envs loco_drake loco_drake.tracking.registration" in entries
