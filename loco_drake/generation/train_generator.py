@@ -64,8 +64,8 @@ def encode_clips(tokenizer: Tokenizer, clips: Sequence[Clip]) -> list[Codes]:
     return encoded
 
 
-def stitched_clips(clips: Sequence[Clip], seed: int) -> list[Clip]:
-    """Returns long motions made of the clips, as many of each robot and label.
+def stitched_clips(clips: Sequence[Clip], count: int, seed: int) -> list[Clip]:
+    """Returns long motions made of the clips, ``count`` of each robot and label.
 
     Raises:
         InputError: if all clips of a robot and label are too short.
@@ -77,7 +77,7 @@ def stitched_clips(clips: Sequence[Clip], seed: int) -> list[Clip]:
     stitched = []
     for (robot, label), group in sorted(groups.items()):
         stitcher = Stitcher(group)
-        for _ in range(STITCHED):
+        for _ in range(count):
             features = stitcher(round(STITCHED_SECONDS * FPS), random)
             stitched.append(Clip(robot, label, "stitched", features))
     return stitched
@@ -88,8 +88,16 @@ def train_generator(
     tokenizer: Tokenizer,
     config: GeneratorConfig,
     settings: LoopSettings,
+    stitched: int = STITCHED,
 ) -> tuple[Generator, LoopResult]:
     """Trains a generator and writes ``generator.safetensors`` if it was not stopped.
+
+    Args:
+        library: what to learn from.
+        tokenizer: trained on it.
+        config: sizes of the network.
+        settings: of the training.
+        stitched: how many long motions to make of each robot's clips of each label.
 
     Raises:
         InputError: if the tokenizer does not know a robot of the library, or all
@@ -99,7 +107,9 @@ def train_generator(
     if missing:
         known = ", ".join(tokenizer.config.robots)
         raise InputError(f"The tokenizer knows {known}, not {', '.join(missing)}.")
-    encoded = encode_clips(tokenizer, stitched_clips(library.train, settings.seed))
+    encoded = encode_clips(
+        tokenizer, stitched_clips(library.train, stitched, settings.seed)
+    )
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
         generator = Generator(config)
@@ -109,7 +119,11 @@ def train_generator(
         loss = generator_loss(generator, *make_batch(config, chosen, random))
         return loss, {}
 
-    run = {"network": asdict(config), "corruption": CORRUPTION}
+    run = {
+        "network": asdict(config),
+        "corruption": CORRUPTION,
+        "stitched": stitched,
+    }
     result = train("generator", generator, loss_of_batch, settings, run)
     if not result.stopped:
         info = {"robots": list(library.robots)}

@@ -74,6 +74,7 @@ def test_training_makes_the_generator_better(library, tokenizer, tmp_path):
         tokenizer,
         generator_config(tokenizer),
         LoopSettings(tmp_path, 80, 3e-3),
+        stitched=4,
     )
     assert not result.stopped
     assert result.loss < 0.7 * np.log(16)
@@ -102,13 +103,13 @@ def test_a_resumed_generator_is_bit_for_bit_the_uninterrupted_one(
 ):
     config = generator_config(tokenizer)
     settings = LoopSettings(tmp_path / "whole", 8, 3e-3)
-    whole, _ = train_generator(library, tokenizer, config, settings)
+    whole, _ = train_generator(library, tokenizer, config, settings, stitched=2)
     halves = replace(settings, out=tmp_path / "halves")
     stop_after(monkeypatch, 5)
-    _, result = train_generator(library, tokenizer, config, halves)
+    _, result = train_generator(library, tokenizer, config, halves, stitched=2)
     assert (result.steps, result.stopped) == (5, True)
     resumed, _ = train_generator(
-        library, tokenizer, config, replace(halves, resume=True)
+        library, tokenizer, config, replace(halves, resume=True), stitched=2
     )
     assert same_weights(resumed, whole)
 
@@ -161,7 +162,7 @@ def test_a_damaged_checkpoint_is_refused(library, tmp_path):
 def test_windows_are_shifted_by_one_token(library, tokenizer):
     """Where the input was not corrupted, it is the target of the step before."""
     config = generator_config(tokenizer)
-    encoded = encode_clips(tokenizer, stitched_clips(library.train, 0)[::3])
+    encoded = encode_clips(tokenizer, stitched_clips(library.train, 16, 0))
     random = np.random.default_rng(0)
     before, labels, duration, codes = make_batch(config, encoded, random)
     agree = (before[:, 1:] == codes[:, :-1]).float().mean()

@@ -23,8 +23,10 @@ def env(plans):
     return TrackingEnv(plans, EnvironmentConfig(position_noise=0, velocity_noise=0))
 
 
-# Actions are normal variates, clipped only far out; the checker would have them in +-1.
+# Recommendations, not requirements: actions are normal variates, clipped only far out,
+# and observations are physical quantities without bounds.
 @pytest.mark.filterwarnings("ignore:.*symmetric and normalized space")
+@pytest.mark.filterwarnings("ignore:.*Box observation space m.* value is -?infinity")
 def test_gymnasiums_checker_finds_nothing(plans):
     check_env(TrackingEnv(plans), skip_render_check=True)
 
