@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.errors import InputError
+from loco_drake.gaits import parse_label
 from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import Robot
 from loco_drake.motion import FPS, Motion
@@ -121,13 +123,21 @@ def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> P
     """Returns ``motion`` as a Plan for ``robot``.
 
     Raises:
-        ValueError: if the motion is not at :data:`loco_drake.motion.FPS`, or is of
-            another robot.
+        InputError: if the motion is not at :data:`loco_drake.motion.FPS`, is of
+            another robot, or of a gait that is none of the fifteen.
     """
     if motion.fps != FPS:
-        raise ValueError(f"the motion is at {motion.fps} frames/s, plans are at {FPS}")
+        raise InputError(
+            f"The motion is at {motion.fps} frames/s, but plans are at {FPS}."
+        )
+    if motion.robot != robot.name:
+        raise InputError(f"The motion is of {motion.robot}, not of {robot.name}.")
     if motion.joint_names != robot.joint_names:
-        raise ValueError(f"the motion is of {motion.robot}, the robot is {robot.name}")
+        raise InputError(
+            f"The joints of the motion are not those of {robot.name}: "
+            f"{', '.join(robot.joint_names)}."
+        )
+    label = parse_label(str(motion.label))
     return make_plan(
         robot,
         q=np.hstack(
@@ -141,7 +151,7 @@ def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> P
             )
         ),
         contacts=motion.contacts.copy(),
-        labels=np.full(len(motion), motion.label.index),
+        labels=np.full(len(motion), label.index),
         start_time=start_time,
     )
 

@@ -7,6 +7,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
 
+from loco_drake.errors import InputError
 from loco_drake.keypoints import LEGS
 from loco_drake.models.robots import AddRobotModel
 from loco_drake.systems.plan import (
@@ -88,11 +89,15 @@ def _arrays():
 
 def test_motion_of_another_rate_or_robot_is_refused(go2):
     motion = synthetic_motion("dog-trot", 1.0)
-    with pytest.raises(ValueError, match="25"):
+    with pytest.raises(InputError, match="25"):
         plan_from_motion(go2, replace(motion, fps=25.0))
+    with pytest.raises(InputError, match="of a1, not of go2"):
+        plan_from_motion(go2, replace(motion, robot="a1"))
     names = ("x", *motion.joint_names[1:])
-    with pytest.raises(ValueError, match="is of a1, the robot is go2"):
-        plan_from_motion(go2, replace(motion, robot="a1", joint_names=names))
+    with pytest.raises(InputError, match="joints .* FL_hip_joint, FL_thigh_joint"):
+        plan_from_motion(go2, replace(motion, joint_names=names))
+    with pytest.raises(InputError, match="dog-waltz.* dog-pace, dog-trot"):
+        plan_from_motion(go2, replace(motion, gait="waltz"))
 
 
 def test_the_standing_plan_has_its_soles_on_the_ground(go2):
