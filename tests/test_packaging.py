@@ -1,8 +1,6 @@
 """The wheel holds what the library needs, and works outside the checkout."""
 
-import os
 import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
@@ -10,30 +8,16 @@ import pytest
 
 from loco_drake import __version__
 from loco_drake.models.robots import get_robot
+from tests.process import run_python
 
 ROOT = Path(__file__).parents[1]
-
-
-def python(*arguments, cwd, **environment):
-    """Runs Python in another process; returns what it printed."""
-    process = subprocess.run(
-        [sys.executable, *map(str, arguments)],
-        cwd=cwd,
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert process.returncode == 0, process.stderr
-    return process.stdout
 
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     """The wheel, built as pip builds it, but without an environment of its own."""
     folder = tmp_path_factory.mktemp("dist")
-    python("-m", "hatchling", "build", "-t", "wheel", "-d", folder, cwd=ROOT)
+    run_python("-m", "hatchling", "build", "-t", "wheel", "-d", folder, cwd=ROOT)
     (path,) = folder.glob("*.whl")
     return path
 
@@ -104,7 +88,7 @@ def test_wheel_has_one_package_its_licence_and_no_recordings(wheel):
 
 def test_source_distribution_holds_the_linked_folders(tmp_path):
     """From it a wheel can be built: its links were followed."""
-    python("-m", "hatchling", "build", "-t", "sdist", "-d", tmp_path, cwd=ROOT)
+    run_python("-m", "hatchling", "build", "-t", "sdist", "-d", tmp_path, cwd=ROOT)
     (path,) = tmp_path.glob("*.tar.gz")
     names = subprocess.run(
         ["tar", "-tzf", path], capture_output=True, text=True, check=True
@@ -155,7 +139,7 @@ for entry_point in distribution("loco_drake").entry_points:
 
 def test_installed_wheel_simulates_the_go2_outside_the_checkout(installed, tmp_path):
     """The Go2 has its mass, and stands to within a centimetre after half a second."""
-    printed = python("-c", STEP, cwd=tmp_path, PYTHONPATH=str(installed))
+    printed = run_python("-c", STEP, cwd=tmp_path, PYTHONPATH=str(installed))
     file, numbers = printed.splitlines()
     assert Path(file) == installed / "loco_drake" / "__init__.py"
     mass, height = map(float, numbers.split())
@@ -165,7 +149,7 @@ def test_installed_wheel_simulates_the_go2_outside_the_checkout(installed, tmp_p
 
 
 def test_entry_points_of_the_installed_wheel_lead_somewhere(installed, tmp_path):
-    printed = python("-c", ENTRY_POINTS, cwd=tmp_path, PYTHONPATH=str(installed))
+    printed = run_python("-c", ENTRY_POINTS, cwd=tmp_path, PYTHONPATH=str(installed))
     version, status, *entries = printed.splitlines()
     assert (version, status) == (__version__, "0")
     assert "console_scripts loco-drake loco_drake.cli.main" in entries

@@ -1,8 +1,5 @@
 import ast
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +7,7 @@ import pytest
 
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.actor import load_actor
+from tests.process import run_python
 from tests.synthetic import write_dog_recording
 
 ROOT = Path(__file__).parents[2]
@@ -17,18 +15,9 @@ ROOT = Path(__file__).parents[2]
 
 def run(cwd, name, *arguments):
     """Runs an example from another folder; returns what it printed."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "LOCO_DRAKE_CACHE": str(cwd)}
-    process = subprocess.run(
-        [sys.executable, ROOT / "examples" / name, *map(str, arguments)],
-        cwd=cwd,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert process.returncode == 0, process.stderr
-    return process.stdout
+    environment = {"PYTHONPATH": str(ROOT), "LOCO_DRAKE_CACHE": str(cwd)}
+    script = ROOT / "examples" / name
+    return run_python(script, *arguments, cwd=cwd, **environment)
 
 
 def test_simulate_walks_ahead(tmp_path):
