@@ -175,7 +175,8 @@ def load_motion(path: Path) -> Motion:
     if not path.is_file():
         raise InputError(f"There is no Motion file {str(path)!r}.")
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        # numpy leaves a file open that it cannot read.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         header = json.loads(str(arrays.pop("header")))
         version = int(header["schema_version"])

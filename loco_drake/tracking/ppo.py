@@ -68,10 +68,14 @@ class AdaptivePPO(PPO):
 
     def split_optimizer(self, critic_rate: float) -> None:
         """Gives actor and critic parameter groups of their own."""
-        actor, critic = [], []
+        actor: list[torch.nn.Parameter] = []
+        critic: list[torch.nn.Parameter] = []
         for name, parameter in self.policy.named_parameters():
             (critic if "value" in name else actor).append(parameter)
-        groups = [{"params": actor}, {"params": critic, "lr": critic_rate}]
+        groups: list[dict[str, Any]] = [
+            {"params": actor},
+            {"params": critic, "lr": critic_rate},
+        ]
         self.policy.optimizer = torch.optim.Adam(groups, lr=self.rate, eps=1e-5)
 
     def train(self) -> None:

@@ -94,9 +94,9 @@ def test_motion_of_another_rate_or_robot_is_refused(go2):
     with pytest.raises(InputError, match="of a1, not of go2"):
         plan_from_motion(go2, replace(motion, robot="a1"))
     names = ("x", *motion.joint_names[1:])
-    with pytest.raises(InputError, match="joints .* FL_hip_joint, FL_thigh_joint"):
+    with pytest.raises(InputError, match=r"joints .* FL_hip_joint, FL_thigh_joint"):
         plan_from_motion(go2, replace(motion, joint_names=names))
-    with pytest.raises(InputError, match="dog-waltz.* dog-pace, dog-trot"):
+    with pytest.raises(InputError, match=r"dog-waltz.* dog-pace, dog-trot"):
         plan_from_motion(go2, replace(motion, gait="waltz"))
 
 
