@@ -30,7 +30,7 @@ from loco_drake.motion import FPS
 BATCH = 24  # windows
 GROWTH = 12  # tokens by which a window grows while a chunk is written
 NO_HISTORY = 0.15  # share of windows that begin a sequence
-# Long motions to learn from, for each robot and label: tokens depend on where a
+# Long motions to learn from, on average for each robot and label: tokens depend on where a
 # motion is cut into them, so that the same clips are worth seeing many times.
 STITCHED = 150
 STITCHED_SECONDS = 20.0  # each
@@ -65,7 +65,10 @@ def encode_clips(tokenizer: Tokenizer, clips: Sequence[Clip]) -> list[Codes]:
 
 
 def stitched_clips(clips: Sequence[Clip], count: int, seed: int) -> list[Clip]:
-    """Returns long motions made of the clips, ``count`` of each robot and label.
+    """Returns long motions made of the clips, ``count`` for each robot and label.
+
+    How many there are of one grows with the square root of the seconds of its clips:
+    much recorded gaits are more varied.
 
     Raises:
         InputError: if all clips of a robot and label are too short.
@@ -74,10 +77,12 @@ def stitched_clips(clips: Sequence[Clip], count: int, seed: int) -> list[Clip]:
     groups: dict[tuple[str, GaitLabel], list[Clip]] = {}
     for clip in clips:
         groups.setdefault((clip.robot, clip.label), []).append(clip)
+    roots = {key: sum(map(len, group)) ** 0.5 for key, group in groups.items()}
+    mean = sum(roots.values()) / len(roots)
     stitched = []
     for (robot, label), group in sorted(groups.items()):
         stitcher = Stitcher(group)
-        for _ in range(count):
+        for _ in range(max(1, round(count * roots[robot, label] / mean))):
             features = stitcher(round(STITCHED_SECONDS * FPS), random)
             stitched.append(Clip(robot, label, "stitched", features))
     return stitched
@@ -97,7 +102,7 @@ def train_generator(
         tokenizer: trained on it.
         config: sizes of the network.
         settings: of the training.
-        stitched: how many long motions to make of each robot's clips of each label.
+        stitched: how many long motions to make for each robot and label.
 
     Raises:
         InputError: if the tokenizer does not know a robot of the library, or all
