@@ -12,6 +12,7 @@ from pydrake.systems.framework import Diagram
 
 from loco_drake.models.plant import ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import get_robot
+from loco_drake.rotations import quat_multiply, quat_rotate, yaw_quat
 from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.observation import OBSERVATION_SIZE
 from loco_drake.systems.plan import PLAN_DT, Plan
@@ -24,6 +25,38 @@ Observation = NDArray[np.float32]
 
 
 @dataclass(kw_only=True)
+class ResetNoise:
+    """How far from the plan's state episodes start, as standard deviations.
+
+    A robot that is moved off its plan at the start learns to come back to it: without
+    that, a policy once pushed out of the plan's neighbourhood stays beside it.
+
+    Attributes:
+        joints: rad.
+        velocities: of joints (rad/s) and base (rad/s and m/s).
+        position: of the base along x and y, m.
+        heading: of the base, rad; its velocity turns with it.
+    """
+
+    joints: float = 0.02
+    velocities: float = 0.1
+    position: float = 0.1
+    heading: float = 0.1
+
+    def draw(self, state: Array, random: np.random.Generator) -> Array:
+        """Returns a state [q, v], as in Plan, near ``state``."""
+        state = state.copy()
+        turn = yaw_quat(self.heading * random.standard_normal())
+        state[:4] = quat_multiply(turn, state[:4])
+        state[19:22] = quat_rotate(turn, state[19:22])
+        state[22:25] = quat_rotate(turn, state[22:25])
+        state[4:6] += self.position * random.standard_normal(2)
+        state[7:19] += self.joints * random.standard_normal(12)
+        state[19:] += self.velocities * random.standard_normal(18)
+        return state
+
+
+@dataclass(kw_only=True)
 class EnvironmentConfig:
     """An environment, but for its plans.
 
@@ -32,16 +65,14 @@ class EnvironmentConfig:
         plant: contact, step and friction.
         termination: when an episode ends early.
         episode_steps: an episode is truncated after this many steps.
-        position_noise: standard deviation of the joints at reset, rad.
-        velocity_noise: standard deviation of all velocities at reset, rad/s and m/s.
+        reset_noise: how far from the plan's state episodes start.
     """
 
     robot: str = "go2"
     plant: PlantConfig = field(default_factory=PlantConfig)
     termination: TerminationConfig = field(default_factory=TerminationConfig)
     episode_steps: int = 200
-    position_noise: float = 0.02
-    velocity_noise: float = 0.1
+    reset_noise: ResetNoise = field(default_factory=ResetNoise)
 
 
 @lru_cache(maxsize=4)
@@ -134,9 +165,7 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
         self._context.SetTime(sample * PLAN_DT)
         self._player.SetPlan(self._player_context, plan)
         self._action.GetMutableData().get_mutable_value().set_value(np.zeros(12))
-        state = np.concatenate((plan.q[sample], plan.v[sample]))
-        state[7:19] += self.config.position_noise * self.np_random.standard_normal(12)
-        state[19:] += self.config.velocity_noise * self.np_random.standard_normal(18)
+        state = self.config.reset_noise.draw(plan.state[sample], self.np_random)
         self._plant.SetPositionsAndVelocities(self._plant_context, state)
         self._simulator.Initialize()
         return self._observe(), dict(self._start)

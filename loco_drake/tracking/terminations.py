@@ -22,8 +22,8 @@ class TerminationConfig:
         rotation: angle of the base from the plan's, rad.
     """
 
-    position: float = 0.5
-    rotation: float = 1.0
+    position: float = 0.35
+    rotation: float = 0.8
 
 
 def is_lost(

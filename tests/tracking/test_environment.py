@@ -3,24 +3,27 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from pydrake.systems.analysis import Simulator
+from scipy.spatial.transform import Rotation
 
 from loco_drake.errors import InputError
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import save_motion
+from loco_drake.rotations import yaw_of
 from loco_drake.systems.diagram import MakeLocomotionDiagram, PlaceOnPlan
 from loco_drake.systems.plan import PLAN_DT
 from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
-from loco_drake.tracking.environment import EnvironmentConfig, TrackingEnv
+from loco_drake.tracking.environment import EnvironmentConfig, ResetNoise, TrackingEnv
 from loco_drake.tracking.references import load_references
 from loco_drake.tracking.registration import make_tracking, register
 from tests.synthetic_motion import synthetic_motion
 
+NO_NOISE = ResetNoise(joints=0, velocities=0, position=0, heading=0)
 STILL = np.zeros(12, dtype=np.float32)
 
 
 @pytest.fixture
 def env(plans):
-    return TrackingEnv(plans, EnvironmentConfig(position_noise=0, velocity_noise=0))
+    return TrackingEnv(plans, EnvironmentConfig(reset_noise=NO_NOISE))
 
 
 # Recommendations, not requirements: actions are normal variates, clipped only far out,
@@ -130,7 +133,7 @@ def test_same_seed_same_episode_other_seed_another(plans):
 
 
 def test_environments_share_a_diagram_but_no_state(plans):
-    config = EnvironmentConfig(position_noise=0, velocity_noise=0)
+    config = EnvironmentConfig(reset_noise=NO_NOISE)
     first, second = TrackingEnv(plans, config), TrackingEnv(plans, config)
     assert first._diagram is second._diagram
     start, _ = first.reset(options={"plan": 0, "sample": 0})
@@ -138,6 +141,24 @@ def test_environments_share_a_diagram_but_no_state(plans):
     for _ in range(5):
         second.step(STILL + 1)
     np.testing.assert_array_equal(first._observe(), start)
+
+
+def test_reset_noise_moves_and_turns_the_robot_as_a_whole(plans):
+    """Turned by psi about z, velocities with it; joints and heights as they were."""
+    noise = ResetNoise(joints=0, velocities=0, position=0.5, heading=0.5)
+    state = plans[0].state[20]
+    near = noise.draw(state, np.random.default_rng(0))
+    psi = yaw_of(near[:4]) - yaw_of(state[:4])
+    assert abs(psi) > 0.01
+    turn = Rotation.from_euler("z", psi)
+    np.testing.assert_allclose(near[22:25], turn.apply(state[22:25]), atol=1e-9)
+    np.testing.assert_allclose(near[19:22], turn.apply(state[19:22]), atol=1e-9)
+    own = turn * Rotation.from_quat(state[:4], scalar_first=True)
+    there = Rotation.from_quat(near[:4], scalar_first=True)
+    np.testing.assert_allclose(there.as_matrix(), own.as_matrix(), atol=1e-9)
+    assert np.linalg.norm(near[4:6] - state[4:6]) > 0.05
+    np.testing.assert_array_equal(near[6:19], state[6:19])
+    np.testing.assert_array_equal(near[25:], state[25:])
 
 
 def test_references_must_be_there_and_of_the_robot(tmp_path):
