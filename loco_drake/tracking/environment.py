@@ -46,7 +46,7 @@ class ResetNoise:
     def draw(self, state: Array, random: np.random.Generator) -> Array:
         """Returns a state [q, v], as in Plan, near ``state``."""
         state = state.copy()
-        turn = yaw_quat(self.heading * random.standard_normal())
+        turn = yaw_quat(self.heading * random.standard_normal(1))[0]
         state[:4] = quat_multiply(turn, state[:4])
         state[19:22] = quat_rotate(turn, state[19:22])
         state[22:25] = quat_rotate(turn, state[22:25])
