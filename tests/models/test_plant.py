@@ -198,28 +198,31 @@ def test_desired_velocity_folded_into_the_position_is_the_same_pd():
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_default_contact_against_itself_at_1_ms_and_against_cenic(name):
-    """Over a 4 s trot of 1.3 m the default is within 13 %; see docs/contact.md.
+    """Over a 4 s trot of 1.4 m the default is within 10 %; see docs/contact.md.
 
-    The two references, a fine step and an integrator with error control, agree five
-    times better with each other.
+    The two references, a fine step and an integrator with error control, agree within
+    2 % with each other.
     """
     default = trot(name, PlantConfig())
     fine = trot(name, PlantConfig(time_step=1e-3))
     cenic = trot(name, PlantConfig(contact="cenic", accuracy=1e-4))
     assert cenic[0] > 1.2
-    assert np.abs(fine - cenic).max() < 0.02
-    assert abs(default[0] - cenic[0]) < 0.13 * cenic[0]
+    assert np.abs(fine - cenic).max() < 0.02 * cenic[0]
+    assert abs(default[0] - cenic[0]) < 0.1 * cenic[0]
     assert abs(default[1] - cenic[1]) < 0.08
     assert abs(default[2] - cenic[2]) < np.radians(4)
 
 
 def test_discrete_solvers_agree_at_the_default_step():
-    """With feet of rubber the answer is not the solver's: 3 cm over a trot of 1.2 m."""
+    """With feet of rubber the answer is not the solver's, over a trot of 1.4 m."""
     results = [
         trot("go2", PlantConfig(contact=contact))
         for contact in ("similar", "lagged", "sap")
     ]
-    assert np.ptp(results, axis=0).max() < 0.03
+    x, y, yaw = np.ptp(results, axis=0)
+    assert x < 0.01
+    assert y < 0.05
+    assert yaw < np.radians(3)
 
 
 def test_config_loads_from_yaml():
@@ -243,7 +246,7 @@ def test_bad_config_is_refused(config, message):
 
 
 def test_friction_holds_or_slips():
-    """On ice (.05) the trot that gains 1.2 m on .8 gets nowhere near as far."""
+    """On ice (.02) the trot that gains 1.4 m on .8 gets nowhere near as far."""
     assert (
-        trot("go2", PlantConfig(friction=0.05))[0] < 0.5 * trot("go2", PlantConfig())[0]
+        trot("go2", PlantConfig(friction=0.02))[0] < 0.5 * trot("go2", PlantConfig())[0]
     )
