@@ -1,7 +1,9 @@
 """``gymnasium.make("loco_drake/Tracking-v0")``.
 
-Gymnasium finds :func:`register` by the package's entry point, at its own import: so
-this module imports nothing that takes time.
+Gymnasium knows the environment once :mod:`loco_drake.tracking` is imported, which
+``gymnasium.make("loco_drake.tracking:loco_drake/Tracking-v0")`` does itself: since its
+version 1 there are no entry points for that. This module imports nothing that takes
+time.
 """
 
 from collections.abc import Sequence
@@ -15,9 +17,10 @@ if TYPE_CHECKING:
 
 
 def register() -> None:
-    """Registers the environment; Gymnasium adds the namespace."""
+    """Registers the environment."""
     gymnasium.register(
-        id="Tracking-v0", entry_point="loco_drake.tracking.registration:make_tracking"
+        id="loco_drake/Tracking-v0",
+        entry_point="loco_drake.tracking.registration:make_tracking",
     )
 
 

@@ -14,7 +14,7 @@ from loco_drake.systems.plan import PLAN_DT
 from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
 from loco_drake.tracking.environment import EnvironmentConfig, ResetNoise, TrackingEnv
 from loco_drake.tracking.references import load_references
-from loco_drake.tracking.registration import make_tracking, register
+from loco_drake.tracking.registration import make_tracking
 from tests.synthetic_motion import synthetic_motion
 
 NO_NOISE = ResetNoise(joints=0, velocities=0, position=0, heading=0)
@@ -36,9 +36,6 @@ def test_gymnasiums_checker_finds_nothing(plans):
 
 def test_gymnasium_makes_it_by_name(tmp_path):
     save_motion(synthetic_motion("dog-trot", 2.0), tmp_path / "trot.npz")
-    if "loco_drake/Tracking-v0" not in gymnasium.registry:
-        with gymnasium.envs.registration.namespace("loco_drake"):
-            register()
     env = gymnasium.make("loco_drake/Tracking-v0", references=tmp_path)
     assert isinstance(env.unwrapped, TrackingEnv)
     observation, _ = env.reset(seed=0)
