@@ -137,7 +137,7 @@ print(script.load()(["--version"]), script.load().__code__.co_filename)
 GYMNASIUM = """
 import gymnasium
 
-name = "loco_drake.tracking:loco_drake/Tracking-v0"
+name = "loco_drake:loco_drake/Tracking-v0"
 env = gymnasium.make(name, labels=["dog-trot"], count=1, seconds=2.0)
 print(env.reset(seed=0)[0].shape == env.observation_space.shape, env.spec.id)
 """

@@ -31,7 +31,7 @@ class GeneratorConfig:
 
     Attributes:
         tokenizer: fingerprint of the tokenizer whose codes it writes.
-        books: codebooks of that tokenizer.
+        books: how many of that tokenizer's codebooks it writes, the coarsest first.
         book_size: codes in a book.
         frames_per_token: frames that a token stands for.
         labels: names of the gait labels it was trained on.

@@ -145,7 +145,7 @@ class MotionModel:
         """
         seeds = np.array(seeds, dtype=np.int64)
         batch = len(seeds)
-        books = self.tokenizer.config.books
+        books = self.generator.config.books
         return Stream(
             seeds=seeds,
             duration=np.broadcast_to(np.asarray(duration, np.float64), (batch,)).copy(),
@@ -195,7 +195,7 @@ class MotionModel:
         # The first tokens are only there for the decoder to look back at.
         lead = 0 if stream.chunk else self._lead
         new = np.concatenate((np.repeat(new[:, :1], lead, axis=1), new), axis=1)
-        shape = (lead + steps, self.tokenizer.config.books)
+        shape = (lead + steps, self.generator.config.books)
         dice = [uniforms(int(seed), stream.chunk, shape) for seed in stream.seeds]
         window = self.generator.config.window
         history, given = stream.tokens[:, -window:], stream.labels[:, -window:]

@@ -121,7 +121,7 @@ class Tokenizer(nn.Module):
         """Returns features (B, n * frames_per_token, SIZE), contacts as probabilities.
 
         Args:
-            codes: shape (B, n, books).
+            codes: of all books or of the first few, shape (B, n, <= books).
             robot: index into ``config.robots``, shape (B,).
         """
         features = self.decode_embedded(self.lookup(codes), robot)
@@ -130,7 +130,8 @@ class Tokenizer(nn.Module):
 
     def lookup(self, codes: Tensor) -> Tensor:
         """Returns the sum of the books' vectors: (B, n, books) -> (B, n, code_size)."""
-        total: Tensor = self.codebooks[torch.arange(len(self.codebooks)), codes].sum(-2)
+        books = torch.arange(codes.shape[-1])
+        total: Tensor = self.codebooks[books, codes].sum(dim=-2)
         return total
 
     def decode_embedded(self, embedded: Tensor, robot: Tensor) -> Tensor:

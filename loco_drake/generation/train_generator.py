@@ -53,14 +53,16 @@ class Codes:
         return len(self.codes)
 
 
-def encode_clips(tokenizer: Tokenizer, clips: Sequence[Clip]) -> list[Codes]:
-    """Returns the tokens of each clip."""
+def encode_clips(
+    tokenizer: Tokenizer, clips: Sequence[Clip], books: int
+) -> list[Codes]:
+    """Returns the tokens of each clip, the first ``books`` codes of each."""
     encoded = []
     for clip in clips:
         robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
         with torch.inference_mode(), single_thread():
             codes = tokenizer.encode(clip_tensor(tokenizer, clip), robot)
-        encoded.append(Codes(clip.label.index, codes[0].numpy()))
+        encoded.append(Codes(clip.label.index, codes[0, :, :books].numpy()))
     return encoded
 
 
@@ -113,7 +115,7 @@ def train_generator(
         known = ", ".join(tokenizer.config.robots)
         raise InputError(f"The tokenizer knows {known}, not {', '.join(missing)}.")
     encoded = encode_clips(
-        tokenizer, stitched_clips(library.train, stitched, settings.seed)
+        tokenizer, stitched_clips(library.train, stitched, settings.seed), config.books
     )
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
@@ -188,7 +190,7 @@ def score_generator(
     """Returns the cross-entropy of whole clips in nats a code."""
     total, count = 0.0, 0
     config = generator.config
-    for sequence in encode_clips(tokenizer, clips):
+    for sequence in encode_clips(tokenizer, clips, config.books):
         codes = torch.from_numpy(sequence.codes)[None]
         first = torch.full((1, 1, config.books), config.book_size)
         labels = torch.full(codes.shape[:2], sequence.label)

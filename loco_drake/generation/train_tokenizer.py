@@ -2,7 +2,8 @@
 
 The codebooks follow exponential moving averages of what they stand for, and codes
 that nothing is near to are taken from the batch anew, both by
-vector-quantize-pytorch.
+vector-quantize-pytorch. The finest books are left out at random, so that the decoder
+makes the best of the coarse ones alone.
 """
 
 from collections.abc import Sequence
@@ -30,6 +31,7 @@ Array = NDArray[np.float64]
 
 WINDOW = 64  # frames
 BATCH = 32  # windows
+FEWEST_BOOKS = 2  # batches are decoded from between so many and all of the books
 TEMPO = 1.15  # windows are played at most this much faster or slower
 
 # Weights of the losses; each is scaled to be about 1 before training.
@@ -78,6 +80,8 @@ class LearningTokenizer(nn.Module):
             kmeans_iters=20,
             decay=0.98,
             threshold_ema_dead_code=1,
+            quantize_dropout=True,
+            quantize_dropout_cutoff_index=FEWEST_BOOKS - 1,
         )
 
     def forward(self, features: Tensor, robot: Tensor) -> tuple[Tensor, Tensor]:

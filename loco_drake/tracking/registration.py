@@ -1,9 +1,7 @@
 """``gymnasium.make("loco_drake/Tracking-v0")``.
 
-Gymnasium knows the environment once :mod:`loco_drake.tracking` is imported, which
-``gymnasium.make("loco_drake.tracking:loco_drake/Tracking-v0")`` does itself: since its
-version 1 there are no entry points for that. This module imports nothing that takes
-time.
+Gymnasium knows the environment once :mod:`loco_drake` is imported; since its version 1
+there are no entry points for that. This module imports nothing else that takes time.
 """
 
 from collections.abc import Sequence
