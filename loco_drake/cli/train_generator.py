@@ -6,10 +6,15 @@ from pathlib import Path
 
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.cli.training import check_steps, print_stopped
+from loco_drake.errors import InputError
 from loco_drake.generation.generator import GeneratorConfig
 from loco_drake.generation.library import load_library
 from loco_drake.generation.tokenizer import load_tokenizer
-from loco_drake.generation.train_generator import score_generator, train_generator
+from loco_drake.generation.train_generator import (
+    STITCHED,
+    score_generator,
+    train_generator,
+)
 from loco_drake.generation.training import LoopSettings
 
 
@@ -26,8 +31,13 @@ class TrainGenerator:
     """Weights from `train tokenizer`."""
     out: Path = Path("runs/generator")
     """Folder for the weights (generator.safetensors), checkpoint and logs."""
+    books: int = 3
+    """Codebooks of the tokenizer that it writes, the coarsest first. Finer ones hold
+    what is too irregular to be predicted."""
     steps: int = 3000
     """Optimizer steps."""
+    stitched: int = STITCHED
+    """Motions of 20 s that are made of the clips to learn from, for each gait."""
     learning_rate: float = 1e-3
     """Highest learning rate."""
     held_out: float = 0.15
@@ -46,11 +56,18 @@ class TrainGenerator:
             InputError: if an option is wrong.
         """
         check_steps(self.steps, self.learning_rate, self.held_out)
+        if self.stitched < 1:
+            raise InputError(f"--stitched must be 1 or more, not {self.stitched}.")
         library = load_library(self.motions, self.held_out, self.seed)
         tokenizer = load_tokenizer(self.tokenizer)
+        if not 1 <= self.books <= tokenizer.config.books:
+            raise InputError(
+                f"--books must be from 1 to {tokenizer.config.books}, as many as the "
+                f"tokenizer has, not {self.books}."
+            )
         config = GeneratorConfig(
             tokenizer=tokenizer.fingerprint,
-            books=tokenizer.config.books,
+            books=self.books,
             book_size=tokenizer.config.book_size,
             frames_per_token=tokenizer.config.frames_per_token,
             labels=tuple(str(label) for label in library.labels),
@@ -64,7 +81,9 @@ class TrainGenerator:
             resume=self.resume,
         )
         start = time.perf_counter()
-        generator, result = train_generator(library, tokenizer, config, settings)
+        generator, result = train_generator(
+            library, tokenizer, config, settings, self.stitched
+        )
         if result.stopped:
             return print_stopped(result.steps, self.steps)
         figures = {"steps": result.steps, "wall_clock_s": time.perf_counter() - start}

@@ -18,7 +18,7 @@ TINY = TokenizerConfig(width=16, depth=2, frame_width=8, books=3, book_size=8)
 def tokenizer():
     torch.manual_seed(0)
     learning = LearningTokenizer(Tokenizer(TINY))
-    for _ in range(2):  # codebooks start from what they are given
+    for _ in range(8):  # codebooks start from what they are given, some late
         learning(torch.randn(8, 32, SIZE), torch.zeros(8, dtype=torch.long))
     return learning.finish()
 
@@ -45,7 +45,8 @@ def test_the_network_is_the_one_that_was_trained():
     """Codes and frames against those of the quantizer that learned the codebooks."""
     torch.manual_seed(0)
     learning = LearningTokenizer(Tokenizer(TINY))
-    learning(torch.randn(8, 32, SIZE), torch.zeros(8, dtype=torch.long))
+    for _ in range(8):
+        learning(torch.randn(8, 32, SIZE), torch.zeros(8, dtype=torch.long))
     tokenizer = learning.finish()
     learning.eval()
     features = torch.randn(1, 24, SIZE)
@@ -59,6 +60,16 @@ def test_the_network_is_the_one_that_was_trained():
         decoded[..., : CONTACTS.start], output[..., : CONTACTS.start]
     )
     torch.testing.assert_close(decoded[..., CONTACTS], output[..., CONTACTS].sigmoid())
+
+
+def test_without_the_finer_books_their_vectors_are_zero(tokenizer):
+    codes = torch.randint(8, (1, 6, 3))
+    coarse = tokenizer.lookup(codes[..., :1])
+    torch.testing.assert_close(coarse, tokenizer.codebooks[0][codes[..., 0]])
+    with torch.no_grad():
+        tokenizer.codebooks[1:] = 0.0
+        a, b = tokenizer.decode(codes, ROBOT), tokenizer.decode(codes[..., :1], ROBOT)
+    assert torch.equal(a, b)
 
 
 def test_frames_do_not_depend_on_later_tokens(tokenizer):

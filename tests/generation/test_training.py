@@ -162,7 +162,7 @@ def test_a_damaged_checkpoint_is_refused(library, tmp_path):
 def test_windows_are_shifted_by_one_token(library, tokenizer):
     """Where the input was not corrupted, it is the target of the step before."""
     config = generator_config(tokenizer)
-    encoded = encode_clips(tokenizer, stitched_clips(library.train, 16, 0))
+    encoded = encode_clips(tokenizer, stitched_clips(library.train, 16, 0), books=2)
     random = np.random.default_rng(0)
     before, labels, duration, codes = make_batch(config, encoded, random)
     agree = (before[:, 1:] == codes[:, :-1]).float().mean()
