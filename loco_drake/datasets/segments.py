@@ -45,7 +45,12 @@ class Segment:
     def read(self) -> KeypointClip:
         """Returns the frames; raises InputError if the file does not hold them."""
         return read_clip(
-            self.source, self.path, gait=self.gait, start=self.start, end=self.end
+            self.source,
+            self.path,
+            gait=self.gait,
+            start=self.start,
+            end=self.end,
+            fps=self.fps,
         )
 
 

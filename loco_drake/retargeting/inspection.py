@@ -48,7 +48,7 @@ def summarize(clip: KeypointClip) -> tuple[ClipSummary, NDArray[np.bool_]]:
         InputError: if the clip is not of an animal on its feet.
     """
     config = load_config(clip.source)
-    height = stance_height(clip, config.stance_height_percentile)
+    height = stance_height(clip, config)
     contacts = detect_contacts(clip, height, config.contact)
     landings = [_landings(contacts[:, leg]) / clip.fps for leg in range(len(LEGS))]
     strides = np.concatenate([np.diff(times) for times in landings])
