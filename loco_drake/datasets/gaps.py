@@ -6,6 +6,7 @@ from scipy.interpolate import CubicSpline
 
 from loco_drake.datasets.normalize import check_range
 from loco_drake.errors import InputError
+from loco_drake.intervals import intervals
 
 Array = NDArray[np.float64]
 
@@ -24,11 +25,11 @@ def mend_gaps(points: Array, longest: int) -> tuple[Array, int]:
     bridged = np.zeros(len(points), dtype=bool)
     frames = np.arange(len(points))
     for marker in range(points.shape[1]):
-        seen = np.isfinite(points[:, marker]).all(axis=-1)
+        seen = _all_seen(points[:, marker])
         if seen.all() or seen.sum() < 4:
             continue
         spline = CubicSpline(frames[seen], points[seen, marker])
-        for start, end in _runs(~seen):
+        for start, end in intervals(~seen):
             if end - start <= longest and start > 0 and end < len(points):
                 points[start:end, marker] = spline(frames[start:end])
                 bridged[start:end] = True
@@ -53,8 +54,8 @@ def usable_stretch(
     Raises:
         InputError: if the stretch does not lie within the file, or has a gap.
     """
-    whole = np.isfinite(points).all(axis=(1, 2))
-    runs = _runs(whole)
+    whole = _all_seen(points)
+    runs = list(intervals(whole))
     if not runs:
         raise InputError(f"{name} has no frame in which all markers were seen.")
     longest = max(runs, key=lambda run: run[1] - run[0])
@@ -70,7 +71,7 @@ def usable_stretch(
     )
 
 
-def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Returns first frame and frame after the last of each run of True."""
-    edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+def _all_seen(points: Array) -> NDArray[np.bool_]:
+    """Returns in which frames (T,) of ``points`` (T, ...) nothing is missing."""
+    seen: NDArray[np.bool_] = np.isfinite(points.reshape(len(points), -1)).all(axis=1)
+    return seen

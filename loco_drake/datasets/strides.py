@@ -37,7 +37,7 @@ def infer_rate(
     frames = stride_frames(fore_aft)
     if frames is None or withers_height <= 0:
         return None
-    correlation = np.corrcoef(fore_aft.T)
+    correlation = np.asarray(np.corrcoef(fore_aft.T))
     trots = (correlation[0, 3] + correlation[1, 2]) / 2 > DIAGONAL
     typical = TYPICAL_PERIOD["trot" if trots else "walk"]
     seconds = typical * np.sqrt(withers_height / GRAVITY)

@@ -26,7 +26,7 @@ def read_table(path: Path, columns: int, what: str) -> NDArray[np.float64]:
             with another number of columns (a last line cut off, another delimiter),
             or holds something other than finite numbers.
     """
-    table = _read_numbers(read_lines(path, what), 1, columns, path, what)
+    table = parse_numbers(read_lines(path, what), 1, columns, path, what)
     finite = np.isfinite(table).all(axis=1)
     if not finite.all():
         number = int(np.argmin(finite)) + 1
@@ -65,7 +65,7 @@ def read_named_table(
     filled = [
         ",".join(field.strip() or "nan" for field in line.split(",")) for line in lines
     ]
-    table = _read_numbers(filled, 2, len(found), path, what)
+    table = parse_numbers(filled, 2, len(found), path, what)
     columns = [found.index(name.lower()) for name in names]
     if np.isinf(table[:, columns]).any():
         number = int(np.argmax(np.isinf(table[:, columns]).any(axis=1))) + 2
@@ -85,10 +85,22 @@ def read_lines(path: Path, what: str) -> list[str]:
     return lines
 
 
-def _read_numbers(
+def parse_numbers(
     lines: list[str], first: int, columns: int, path: Path, what: str
 ) -> NDArray[np.float64]:
-    """Returns the numbers of ``lines``, the first of which is the file's ``first``."""
+    """Returns the numbers of comma-separated lines, shape (lines, ``columns``).
+
+    Args:
+        lines: some of the file's, at least one.
+        first: number of the first of them in the file, for messages.
+        columns: how many numbers each must hold.
+        path: the file, for messages.
+        what: its format, for messages.
+
+    Raises:
+        InputError: if a line has another number of columns, or something other than a
+            number (NaN and infinity are numbers).
+    """
     for number, line in enumerate(lines, start=first):
         found = line.count(",") + 1
         if found != columns:

@@ -1,8 +1,8 @@
 """Walking on a treadmill undone: where the animal would be on the ground.
 
 Hooves in stance stand on the belt, so the trunk moves over it with minus their velocity
-relative to the trunk. Only positions relative to the trunk are used: what a file says of
-the trunk's own way may be the treadmill's frame or somebody's estimate of the belt.
+relative to the trunk. Only positions relative to the trunk are used: what a file says
+of the trunk's own way may be the treadmill's frame or somebody's estimate of the belt.
 """
 
 import numpy as np
