@@ -29,7 +29,7 @@ _CLOSE_ENOUGH = 0.002
 
 
 def folded_length(robot: Robot) -> float:
-    """Returns the least distance of a toe to its thigh joint that the calf allows, m."""
+    """Returns how near in m a toe can be to its thigh joint, the calf at its limit."""
     l1, l2 = robot.thigh_length, robot.calf_length
     square = l1**2 + l2**2 + 2 * l1 * l2 * np.cos(robot.joint_lower[2])
     return float(np.sqrt(square))
