@@ -54,7 +54,7 @@ class Track:
         trunk: horizontal position of the trunk's middle in m, shape (T, 2).
         yaw: heading of the trunk in rad, shape (T,).
         soles: lowest points of the toes in m, ground at z = 0, shape (T, 4, 3).
-        stance_height: of the trunk over the ground in m, the unit of length.
+        stance_height: of the animal or robot in m, the unit of length.
     """
 
     fps: float
@@ -87,8 +87,13 @@ class GaitTiming:
     duty_factors: Array
 
 
-def clip_track(clip: KeypointClip) -> Track:
-    """Returns the track of an animal: its trunk lies between withers and hip."""
+def clip_track(clip: KeypointClip, stance_height: float) -> Track:
+    """Returns the track of an animal: its trunk lies between withers and hip.
+
+    Args:
+        clip: ground at z = 0.
+        stance_height: what is scaled to the robot's, m.
+    """
     spine = clip.withers - clip.hip
     middle = (clip.withers + clip.hip) / 2
     return Track(
@@ -96,7 +101,7 @@ def clip_track(clip: KeypointClip) -> Track:
         trunk=middle[:, :2],
         yaw=np.arctan2(spine[:, 1], spine[:, 0]),
         soles=clip.toes,
-        stance_height=float(np.median(middle[:, 2])),
+        stance_height=stance_height,
     )
 
 

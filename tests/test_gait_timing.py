@@ -12,7 +12,7 @@ from loco_drake.gait_timing import (
 )
 from loco_drake.keypoints import KeypointClip
 from loco_drake.models.robots import get_robot
-from tests.synthetic import GAITS, make_dog
+from tests.synthetic import GAITS, STANCE_HEIGHT, make_dog
 from tests.synthetic_motion import PHASES, synthetic_motion
 
 FPS = 50.0
@@ -80,7 +80,7 @@ def test_timing_of_a_made_dog(gait):
     """What it was made with; soft landings make the duty factor higher."""
     dog = make_dog(gait)
     clip = KeypointClip("dog", gait, 60.0, dog.withers, dog.hip, dog.toes, {})
-    timing = gait_timing(clip_track(clip))
+    timing = gait_timing(clip_track(clip, STANCE_HEIGHT))
     assert timing.stride_period == pytest.approx(dog.gait.period, abs=0.001)
     lag = timing.phase_lags - dog.gait.phase
     assert np.abs((lag + 0.5) % 1 - 0.5).max() < 0.005
@@ -94,9 +94,8 @@ def test_timing_is_the_same_in_another_unit_of_length_and_place():
     timings = []
     for scale in (1.0, 3.7):
         points = (scale * dog.withers, scale * dog.hip, scale * dog.toes)
-        timings.append(
-            gait_timing(clip_track(KeypointClip("dog", "trot", 60.0, *points, {})))
-        )
+        clip = KeypointClip("dog", "trot", 60.0, *points, {})
+        timings.append(gait_timing(clip_track(clip, scale * STANCE_HEIGHT)))
     assert timings[0].stride_period == pytest.approx(timings[1].stride_period)
     lag = timings[0].phase_lags - timings[1].phase_lags
     assert np.abs((lag + 0.5) % 1 - 0.5).max() < 1e-9

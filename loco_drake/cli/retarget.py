@@ -7,7 +7,7 @@ import tyro
 from rich.console import Console
 from rich.progress import Progress
 
-from loco_drake.cli.output import print_table, write_json
+from loco_drake.cli.output import print_failed, print_table, write_json
 from loco_drake.datasets.registry import data_dir, read_clip
 from loco_drake.datasets.segments import Segment, read_segments, select_segments
 from loco_drake.errors import InputError
@@ -67,11 +67,7 @@ class Retarget:
         write_json(self.json, {o.segment.name: _figures(o) for o in outcomes})
         rows = [_row(outcome) for outcome in outcomes if outcome.report is not None]
         print_table(f"Motion files in {out}: {len(rows)}", list(_COLUMNS), rows)
-        console = Console(stderr=True, highlight=False, soft_wrap=True)
-        for outcome in failed:
-            console.print(
-                f"Failed: {outcome.segment.name}: {outcome.error}", markup=False
-            )
+        print_failed((o.segment.name, str(o.error)) for o in failed)
         return 1 if failed else 0
 
     def _segments(self) -> list[Segment]:

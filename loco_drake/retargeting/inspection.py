@@ -49,7 +49,7 @@ def summarize(clip: KeypointClip) -> tuple[ClipSummary, NDArray[np.bool_]]:
     config = load_config(clip.source)
     height = stance_height(clip, config.stance_height_percentile)
     contacts = detect_contacts(clip, height, config.contact)
-    timing = gait_timing(clip_track(clip))
+    timing = gait_timing(clip_track(clip, height))
     summary = ClipSummary(
         frames=len(clip),
         fps=clip.fps,
