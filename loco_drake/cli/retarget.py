@@ -28,15 +28,17 @@ class Retarget:
     file: tyro.conf.Positional[Path | None] = None
     """A recording; needs --source and --gait."""
     source: str | None = None
-    """Where the recordings come from: dog. Default: all."""
+    """Where the recordings come from: dog, horse, mpc or solo8. Default: all."""
     gait: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Gait, such as trot; may be given several times. Default: those of the fifteen."""
     robot: str = "go2"
     """The robot: go2 or a1."""
-    start: int = 0
-    """First frame of FILE, from 0, at its own rate."""
+    start: int | None = None
+    """First frame of FILE, from 0, at its own rate. Default: the first of use."""
     end: int | None = None
     """Frame of FILE after the last. Default: the end of the file."""
+    fps: float | None = None
+    """Rate of FILE in frames/s. Default: what its format, name or motion tells."""
     out: Path | None = None
     """Folder for the Motion files. Default: motions/ROBOT."""
     data_dir: Path | None = None
@@ -73,8 +75,8 @@ class Retarget:
     def _segments(self) -> list[Segment]:
         if self.file is not None:
             return [self._segment_of_file(self.file)]
-        if self.start != 0 or self.end is not None:
-            raise InputError("--start and --end need a FILE.")
+        if (self.start, self.end, self.fps) != (None, None, None):
+            raise InputError("--start, --end and --fps need a FILE.")
         segments = read_segments(data_dir(self.data_dir))
         if self.gait:
             return select_segments(segments, self.source, self.gait)
@@ -86,9 +88,16 @@ class Retarget:
         if self.source is None or len(self.gait) != 1:
             raise InputError("A FILE needs its --source and one --gait.")
         (gait,) = self.gait
-        clip = read_clip(self.source, file, gait=gait, start=self.start, end=self.end)
-        end = self.start + len(clip)
-        return Segment(self.source, file, gait, self.start, end, clip.fps)
+        clip = read_clip(
+            self.source,
+            file,
+            gait=gait,
+            start=self.start,
+            end=self.end,
+            fps=self.fps,
+        )
+        start, end = map(int, clip.provenance["frames"].split("-"))
+        return Segment(self.source, file, gait, start, end, clip.fps)
 
 
 def _figures(outcome: Outcome) -> dict[str, object]:

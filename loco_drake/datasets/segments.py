@@ -74,7 +74,12 @@ class Segment:
             InputError: if the file does not hold them.
         """
         clip = read_clip(
-            self.source, self.path, gait=self.gait, start=self.start, end=self.end
+            self.source,
+            self.path,
+            gait=self.gait,
+            start=self.start,
+            end=self.end,
+            fps=self.fps,
         )
         origin = {"recording": self.recording, "frames_per_second": f"{clip.fps:g}"}
         if self.animal is not None:
