@@ -115,10 +115,12 @@ def read_clip(
         fps: frames per second; None if the format, the file or its motion tells.
 
     Raises:
-        InputError: if the source is unknown, the file not of its format, or the
-            stretch not within it.
+        InputError: if the source is unknown, the file not of its format, the stretch
+            not within it, or the rate not above 0.
     """
     dataset = get_dataset(source)
+    if fps is not None and not 0 < fps < float("inf"):
+        raise InputError(f"A rate must be above 0 frames/s, not {fps:g}.")
     clip = dataset.read(path, gait=gait, start=start, end=end, fps=fps)
     origin = {"licence": dataset.licence, "attribution": dataset.attribution}
     return replace(clip, provenance={**clip.provenance, **origin})

@@ -7,12 +7,10 @@ from loco_drake.datasets.registry import read_clip
 from loco_drake.datasets.segments import read_segments
 from loco_drake.gaits import LABELS
 from loco_drake.intervals import intervals
-from loco_drake.models.robots import get_robot
 from loco_drake.motion import FPS
 from loco_drake.retargeting.config import load_config
 from loco_drake.retargeting.contacts import detect_contacts
 from loco_drake.retargeting.inspection import summarize
-from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import retarget_clip
 from loco_drake.retargeting.scaling import stance_height
 from tests.retargeting.test_retarget import assert_good
@@ -29,16 +27,6 @@ CASES = [
     *(("mpc", gait) for gait in MPC_GAITS),
     ("solo8", "walk"),
 ]
-
-
-@pytest.fixture(scope="module", params=["go2", "a1"])
-def robot(request):
-    return get_robot(request.param)
-
-
-@pytest.fixture(scope="module")
-def solver(robot):
-    return LegSolver(robot, FPS)
 
 
 def made_clip(folder, source, gait):

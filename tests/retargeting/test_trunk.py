@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from loco_drake.models.kinematics import leg_joints
-from loco_drake.models.robots import get_robot
 from loco_drake.motion import FPS
 from loco_drake.retargeting.retarget import within_reach
 from loco_drake.retargeting.scaling import Targets
@@ -12,11 +11,6 @@ from loco_drake.retargeting.trunk import (
     folded_length,
     raise_trunk,
 )
-
-
-@pytest.fixture(params=["go2", "a1"])
-def robot(request):
-    return get_robot(request.param)
 
 
 def standing(robot, height, ahead=0.0, frames=100):
