@@ -12,7 +12,7 @@ from loco_drake.models.robots import get_robot
 from loco_drake.systems.actor import load_actor
 from loco_drake.systems.observation import OBSERVATION_SIZE
 from loco_drake.tracking.checkpoint import load_checkpoint
-from loco_drake.tracking.environment import EnvironmentConfig
+from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.ppo import PpoConfig
 from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.train import TrainingConfig, train_tracker
