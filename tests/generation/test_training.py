@@ -30,7 +30,7 @@ TINY = TokenizerConfig(width=24, depth=1, frame_width=8, books=2, book_size=16)
 
 @pytest.fixture(scope="module")
 def library(motions):
-    return load_library(motions, held_out_fraction=0.2, seed=0)
+    return load_library(motions)
 
 
 @pytest.fixture(scope="module")
