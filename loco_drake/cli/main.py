@@ -32,6 +32,11 @@ _COMMANDS = {
         "EvaluateRetargeting",
         "how well recordings become motion of a robot",
     ),
+    "evaluate tracking": (
+        "evaluate_tracking",
+        "EvaluateTracking",
+        "how well the policy follows its references",
+    ),
 }
 _HELP = ("-h", "--help")
 
