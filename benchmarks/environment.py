@@ -1,6 +1,7 @@
 """What the environment costs beyond the plant: prints the ratio of their speeds.
 
-The environment is stepped with zero actions on generated references, resets included.
+The environments of one training worker, 16 robots, are stepped with zero actions on
+generated references, resets included.
 The bare plant (plant and scene graph, nothing else) is stepped as often at the same
 rate, in the same episodes: it starts in the same states and is sent the same targets,
 so that its legs swing and land as often; resets are not counted. For comparison it also
@@ -30,15 +31,17 @@ from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.pretrained import pretrained_motion_model
 from loco_drake.models.plant import AddRobotPlant, ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import get_robot
-from loco_drake.systems.observation import observe
+from loco_drake.systems.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.systems.plan import PLAN_DT, Plan, plan_from_motion
 from loco_drake.systems.retiming import joint_limits
 from loco_drake.systems.toppra_smoother import smooth_plan
 from loco_drake.systems.tracking_reward import reward_terms
-from loco_drake.tracking.environment import EnvironmentConfig, TrackingEnv
+from loco_drake.tracking.batch import TrackingBatch
+from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.terminations import TerminationConfig, is_lost
 
 ROBOT = "go2"
+ROBOTS = 16  # in a worker
 # What is measured, and its name in the JSON file.
 ROWS = {
     "environment": "environment",
@@ -69,38 +72,38 @@ class Episode:
 
 
 class Environment:
-    """Steps the environment and remembers its episodes."""
+    """Steps the environments of one training worker and remembers their episodes."""
 
     def __init__(self, plans: list[Plan], config: PlantConfig) -> None:
-        self._env = TrackingEnv(plans, EnvironmentConfig(robot=ROBOT, plant=config))
+        self._plans = plans
+        environment = EnvironmentConfig(robot=ROBOT, plant=config)
+        self._batch = TrackingBatch(plans, environment, ROBOTS)
+        self._random = np.random.default_rng(0)
         self.resets = 0
         self.reset_seconds = 0.0
-        self._seed: int | None = 0
-
-    @property
-    def plan(self) -> Plan:
-        """One of the plans."""
-        return self._env.plans[0]
 
     def run(self, steps: int) -> tuple[float, list[Episode]]:
-        """Does ``steps``; returns the seconds they took and the episodes."""
-        action = np.zeros(12, np.float32)
+        """Does ``steps`` in all; returns the seconds they took and the episodes."""
+        actions = np.zeros((ROBOTS, 12))
         start = time.process_time()
-        episodes = [self._reset()]
-        for _ in range(steps):
-            *_, terminated, truncated, _ = self._env.step(action)
-            episodes[-1].steps += 1
-            if terminated or truncated:
-                episodes.append(self._reset())
+        current = [self._reset(i) for i in range(ROBOTS)]
+        episodes = list(current)
+        for _ in range(steps // ROBOTS):
+            _, terminated, truncated = self._batch.step(actions)
+            self._batch.observe()
+            for episode in current:
+                episode.steps += 1
+            for i in np.flatnonzero(terminated | truncated):
+                current[i] = self._reset(int(i))
+                episodes.append(current[i])
         return time.process_time() - start, episodes
 
-    def _reset(self) -> Episode:
+    def _reset(self, i: int) -> Episode:
         start = time.process_time()
-        _, info = self._env.reset(seed=self._seed)
-        self._seed = None
+        self._batch.reset(i, self._random)
         self.reset_seconds += time.process_time() - start
         self.resets += 1
-        return Episode(self._env.plans[info["plan"]], info["sample"])
+        return Episode(self._plans[self._batch.plan[i]], int(self._batch.start[i]))
 
 
 class BarePlant:
@@ -125,7 +128,7 @@ class BarePlant:
 
     def _follow(self, episode: Episode) -> float:
         robot, plan, first = self._robot, episode.plan, episode.first
-        self._restart(np.concatenate((plan.q[first], plan.v[first])))
+        self._restart(plan.state[first])
         samples = np.minimum(first + 1 + np.arange(episode.steps), len(plan) - 1)
         forward = (robot.kd * plan.v[samples, 6:] + plan.torques[samples]) / robot.kp
         return self._advance(plan.q[samples, 7:] + forward)
@@ -151,31 +154,35 @@ class BarePlant:
         return time.process_time() - start
 
 
-def parts(plan: Plan, calls: int = 500) -> dict[str, float]:
-    """Returns the seconds that the environment's own computations take, once each."""
+def parts(plan: Plan, calls: int = 100) -> dict[str, float]:
+    """Returns the seconds a robot that the environment's own computations take."""
     robot, termination = get_robot(ROBOT), TerminationConfig()
-    middle = len(plan) // 2
-    time_now = plan.start_time + middle * PLAN_DT
-    state = plan.state[middle] + 0.01
-    action = np.zeros(12)
+    rows = slice(40, 40 + ROBOTS)
+    wanted, toes = plan.state[rows], plan.p_BoF_H[rows]
+    state = wanted + 0.01
+    ahead = np.arange(40, 40 + ROBOTS)[:, None] + LOOK_AHEAD
+    shown = Preview(
+        plan.q[ahead], plan.v[ahead], plan.contacts[ahead], plan.labels[rows]
+    )
+    action = np.zeros((ROBOTS, 12))
     functions: dict[str, Callable[[], object]] = {
-        "observe": lambda: observe(robot, plan, time_now, state, action),
-        "reward_terms": lambda: reward_terms(robot, plan, time_now, state),
-        "is_lost": lambda: is_lost(robot, termination, state, plan.state[middle]),
+        "observe": lambda: observe(robot, shown, state, action),
+        "reward_terms": lambda: reward_terms(robot, wanted, toes, state),
+        "is_lost": lambda: is_lost(robot, termination, state, wanted),
     }
     seconds = {}
     for name, function in functions.items():
         start = time.process_time()
         for _ in range(calls):
             function()
-        seconds[name] = (time.process_time() - start) / calls
+        seconds[name] = (time.process_time() - start) / calls / ROBOTS
     return seconds
 
 
 def main() -> None:
     """Measures and prints."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=200, help="in each turn")
+    parser.add_argument("--steps", type=int, default=320, help="in each turn")
     parser.add_argument("--turns", type=int, default=15)
     parser.add_argument("--contact", default="similar")
     parser.add_argument("--time-step", type=float, default=0.01, help="s")
@@ -183,7 +190,8 @@ def main() -> None:
     arguments = parser.parse_args()
 
     config = PlantConfig(contact=arguments.contact, time_step=arguments.time_step)
-    environment, bare = Environment(make_plans(), config), BarePlant(config)
+    plans = make_plans()
+    environment, bare = Environment(plans, config), BarePlant(config)
     steps = arguments.steps
     bare.follow(environment.run(100)[1])  # warm
     environment.resets, environment.reset_seconds = 0, 0.0
@@ -208,7 +216,7 @@ def main() -> None:
     resets = 1e3 * environment.reset_seconds / steps / arguments.turns
     print("\nof the environment's step (the functions alone, in a loop):")
     named = {f"resets ({environment.resets})": resets}
-    named |= {name: 1e3 * each for name, each in parts(environment.plan).items()}
+    named |= {name: 1e3 * each for name, each in parts(plans[0]).items()}
     for name, milliseconds in named.items():
         print(f"{name:26} {milliseconds:18.3f}")
     if arguments.json is not None:

@@ -1,11 +1,8 @@
 """Vectorised rotations in numpy; quaternions are (w, x, y, z), as in Drake.
 
-A training step turns a dozen single quaternions, at 20 us each by scipy and as much by
-numpy on arrays of four numbers. So what a step needs has a path of plain floats for a
-single quaternion; the tests hold both paths against scipy.
+All take arrays with any leading shape: training turns a dozen quaternions for each
+robot and step, for many robots at once. The tests hold these functions against scipy.
 """
-
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +12,6 @@ Array = NDArray[np.float64]
 
 def quat_multiply(a: Array, b: Array) -> Array:
     """Returns the Hamilton product a·b; shapes (..., 4) broadcast."""
-    if a.ndim == 1:
-        w, x, y, z = a.tolist()
-        # The transpose of the matrix that multiplies by a from the left.
-        return b @ np.array(
-            [[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]]
-        )
     aw, ax, ay, az = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
     bw, bx, by, bz = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
     return np.stack(
@@ -56,27 +47,30 @@ def _cross(a: Array, b: Array) -> Array:
 
 def quat_to_matrix(q: Array) -> Array:
     """Returns rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
-    single = q.ndim == 1
-    w, x, y, z = q.tolist() if single else np.moveaxis(q, -1, 0)
+    w, x, y, z = np.moveaxis(q, -1, 0)
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
         (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
         (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
-    if single:
-        return np.array(rows)
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def heading_matrix(R_WB: Array) -> Array:
-    """Returns R_WH (3, 3): W turned about z so that its x axis points along the body's.
+    """Returns R_WH (..., 3, 3): W turned about z so that x points along the body's.
 
     Row vectors times R_WH are vectors expressed in H.
     """
-    x, y = float(R_WB[0, 0]), float(R_WB[1, 0])
-    length = math.hypot(x, y)
-    cos, sin = (x / length, y / length) if length > 1e-9 else (1.0, 0.0)
-    return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    x, y = R_WB[..., 0, 0], R_WB[..., 1, 0]
+    length = np.hypot(x, y)
+    upright = length > 1e-9  # else the body points straight up or down
+    cos = np.divide(x, length, out=np.ones_like(x), where=upright)
+    sin = np.divide(y, length, out=np.zeros_like(y), where=upright)
+    R_WH = np.zeros_like(R_WB)
+    R_WH[..., 0, 0] = R_WH[..., 1, 1] = cos
+    R_WH[..., 1, 0], R_WH[..., 0, 1] = sin, -sin
+    R_WH[..., 2, 2] = 1.0
+    return R_WH
 
 
 def quat_log(q: Array) -> Array:
@@ -101,25 +95,7 @@ def quat_exp(rotation: Array) -> Array:
 
 def quat_error(q_WA: Array, q_WB: Array) -> Array:
     """Returns the rotation vector from A to B, expressed in W, shape (..., 3)."""
-    if q_WA.ndim == q_WB.ndim == 1:
-        return np.array(_quat_error(q_WA.tolist(), q_WB.tolist()))
     return quat_log(quat_multiply(q_WB, quat_conjugate(q_WA)))
-
-
-def _quat_error(a: list[float], b: list[float]) -> list[float]:
-    aw, ax, ay, az = a
-    bw, bx, by, bz = b
-    w = bw * aw + bx * ax + by * ay + bz * az
-    xyz = (
-        -bw * ax + bx * aw - by * az + bz * ay,
-        -bw * ay + bx * az + by * aw - bz * ax,
-        -bw * az - bx * ay + by * ax + bz * aw,
-    )
-    if w < 0:
-        w, xyz = -w, (-xyz[0], -xyz[1], -xyz[2])
-    norm = math.hypot(*xyz)
-    scale = 2.0 * math.atan2(norm, w) / norm if norm > 1e-9 else 2.0
-    return [scale * value for value in xyz]
 
 
 def yaw_of(q: Array) -> Array:

@@ -1,5 +1,6 @@
 """What the policy sees: the robot's state and the plan relative to it."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -47,47 +48,66 @@ OBSERVATION_LAYOUT = (
 OBSERVATION_SIZE = sum(size for _, size in OBSERVATION_LAYOUT)
 
 
-def observe(
-    robot: Robot, plan: Plan, time: float, state: Array, action: Array
-) -> Array:
-    """Returns the observation, shape (OBSERVATION_SIZE,).
+@dataclass(frozen=True)
+class Preview:
+    """What the policy is shown of its plan; any leading shape, K samples ahead.
+
+    Attributes:
+        q: positions as in :class:`Plan`, shape (..., K, 19).
+        v: velocities as in :class:`Plan`, shape (..., K, 18).
+        contacts: shape (..., K, 4).
+        label: index into :data:`loco_drake.gaits.LABELS` of the present, shape (...).
+    """
+
+    q: Array
+    v: Array
+    contacts: NDArray[np.bool_]
+    label: NDArray[np.int64]
+
+
+def preview(plan: Plan, time: float) -> Preview:
+    """Returns what is to be shown of ``plan`` at a context time in s."""
+    now = plan.index(time)
+    k = np.minimum(now + LOOK_AHEAD, len(plan) - 1)
+    return Preview(plan.q[k], plan.v[k], plan.contacts[k], plan.labels[now])
+
+
+def observe(robot: Robot, ahead: Preview, state: Array, action: Array) -> Array:
+    """Returns observations, shape (..., OBSERVATION_SIZE).
 
     Args:
         robot: the robot.
-        plan: what it is to do.
-        time: context time in s.
-        state: the plant's [q, v], as in :class:`Plan`.
-        action: the action being applied, shape (J,).
+        ahead: what it is to do.
+        state: the plant's [q, v], as in :class:`Plan`, shape (..., 37).
+        action: the action being applied, shape (..., 12).
     """
-    joints = len(robot.joint_names)
-    q, v = state[: 7 + joints], state[7 + joints :]
-    now = plan.index(time)
-    k = np.minimum(now + LOOK_AHEAD, len(plan) - 1)
-    plan_q, plan_v = plan.q[k], plan.v[k]
-
-    R_WB = quat_to_matrix(q[:4])
-    # Row vectors times R_WH are vectors expressed in H.
+    q, v = state[..., :19], state[..., 19:]
+    R_WB = quat_to_matrix(q[..., :4])
     R_WH = heading_matrix(R_WB)
-    R_BP = quat_log(quat_multiply(quat_conjugate(q[:4]), plan_q[:, :4]))
-    return np.concatenate(
-        (
-            -R_WB[2],
-            v[:3] @ R_WB,
-            v[3:6] @ R_WH,
-            q[6:7],
-            q[7:] - robot.stand_joints,
-            0.1 * v[6:],
-            action,
-            0.1 * plan_v[0, 6:],
-            (plan_q[:, 7:] - q[7:]).ravel(),
-            ((plan_q[:, 4:7] - q[4:7]) @ R_WH).ravel(),
-            R_BP.ravel(),
-            (plan_v[:, 3:6] @ R_WH).ravel(),
-            (plan_v[:, :3] @ R_WH).ravel(),
-            plan.contacts[k].ravel(),
-            ONE_HOT[plan.labels[now]],
-        )
+    parts = (
+        -R_WB[..., 2, :],
+        _times(v[..., :3], R_WB),
+        _times(v[..., 3:6], R_WH),
+        q[..., 6:7],
+        q[..., 7:] - robot.stand_joints,
+        0.1 * v[..., 6:],
+        action,
+        0.1 * ahead.v[..., 0, 6:],
+        ahead.q[..., 7:] - q[..., None, 7:],
+        (ahead.q[..., 4:7] - q[..., None, 4:7]) @ R_WH,
+        quat_log(quat_multiply(quat_conjugate(q[..., None, :4]), ahead.q[..., :4])),
+        ahead.v[..., 3:6] @ R_WH,
+        ahead.v[..., :3] @ R_WH,
+        ahead.contacts,
+        ONE_HOT[ahead.label],
     )
+    shape = state.shape[:-1]
+    return np.concatenate([part.reshape(*shape, -1) for part in parts], axis=-1)
+
+
+def _times(rows: Array, R: Array) -> Array:
+    """Returns row vectors (..., 3) times matrices (..., 3, 3)."""
+    return (rows[..., None, :] @ R)[..., 0, :]
 
 
 class Observation(LeafSystem):
@@ -127,8 +147,7 @@ class Observation(LeafSystem):
         output.set_value(
             observe(
                 self._robot,
-                self._plan.Eval(context),
-                context.get_time(),
+                preview(self._plan.Eval(context), context.get_time()),
                 self._state.Eval(context),
                 self._action.Eval(context),
             )

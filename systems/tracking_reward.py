@@ -11,7 +11,7 @@ from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import Robot
 from loco_drake.rotations import heading_matrix, quat_error, quat_to_matrix
 
-from .plan import Plan, standing_plan
+from .plan import standing_plan
 
 Array = NDArray[np.float64]
 
@@ -21,8 +21,10 @@ REWARD_TERMS = ("joints", "joint_velocities", "toes", "base_pose", "base_velocit
 REWARD_WEIGHTS = np.array([0.5, 0.05, 0.2, 0.15, 0.1])
 
 
-def reward_terms(robot: Robot, plan: Plan, time: float, state: Array) -> Array:
-    """Returns the five terms of the reward, weighted; their sum is at most 1.
+def reward_terms(
+    robot: Robot, plan_state: Array, plan_p_BoF_H: Array, state: Array
+) -> Array:
+    """Returns the five terms of the reward, weighted, (..., 5); their sum is at most 1.
 
     With e the sum of squared errors, in rad, m and s:
 
@@ -35,37 +37,32 @@ def reward_terms(robot: Robot, plan: Plan, time: float, state: Array) -> Array:
 
     Args:
         robot: the robot.
-        plan: what it is to do.
-        time: context time in s.
-        state: the plant's [q, v], as in :class:`Plan`.
+        plan_state: what the plan wants, [q, v] as in :class:`Plan`, shape (..., 37).
+        plan_p_BoF_H: the plan's toes, as :attr:`Plan.p_BoF_H`, shape (..., 4, 3).
+        state: the plant's [q, v], shape (..., 37).
     """
-    joints = len(robot.joint_names)
-    q, v = state[: 7 + joints], state[7 + joints :]
-    k = plan.index(time)
-    plan_q, plan_v = plan.q[k], plan.v[k]
-
-    R_WB = quat_to_matrix(q[:4])
-    # Row vectors times R_WH are vectors expressed in the heading frame H.
-    R_WH = heading_matrix(R_WB)
-    p_BoF_H = toe_positions(robot, q[7:]) @ (R_WB.T @ R_WH)
-
-    velocity = v - plan_v
-    exponents = np.array(
-        [
-            5 * _squares(q[7:] - plan_q[7:]),
-            0.1 * _squares(velocity[6:]),
-            40 * _squares((p_BoF_H - plan.p_BoF_H[k]).ravel()),
-            20 * _squares(q[4:7] - plan_q[4:7])
-            + 10 * _squares(quat_error(q[:4], plan_q[:4])),
-            2 * _squares(velocity[3:6]) + 0.2 * _squares(velocity[:3]),
-        ]
+    q, v = state[..., :19], state[..., 19:]
+    R_WB = quat_to_matrix(q[..., :4])
+    p_BoF_H = toe_positions(robot, q[..., 7:]) @ (
+        np.swapaxes(R_WB, -1, -2) @ heading_matrix(R_WB)
     )
-    terms: Array = REWARD_WEIGHTS * np.exp(-exponents)
-    return terms
+    gap = q[..., 4:] - plan_state[..., 4:19]
+    turn = quat_error(q[..., :4], plan_state[..., :4])
+    velocity = v - plan_state[..., 19:]
+    toes = p_BoF_H - plan_p_BoF_H
+    exponents = (
+        5 * _squares(gap[..., 3:]),
+        0.1 * _squares(velocity[..., 6:]),
+        40 * _squares(toes.reshape(*toes.shape[:-2], 12)),
+        20 * _squares(gap[..., :3]) + 10 * _squares(turn),
+        2 * _squares(velocity[..., 3:6]) + 0.2 * _squares(velocity[..., :3]),
+    )
+    return REWARD_WEIGHTS * np.exp(-np.stack(exponents, axis=-1))
 
 
-def _squares(error: Array) -> float:
-    return float(error @ error)
+def _squares(error: Array) -> Array:
+    """Returns the sum of squares over the last axis."""
+    return np.einsum("...i,...i->...", error, error)
 
 
 class TrackingReward(LeafSystem):
@@ -99,11 +96,13 @@ class TrackingReward(LeafSystem):
         )
 
     def _calc(self, context: Context, output: Any) -> None:
+        plan = self._plan.Eval(context)
+        k = plan.index(context.get_time())
         output.set_value(
             reward_terms(
                 self._robot,
-                self._plan.Eval(context),
-                context.get_time(),
+                plan.state[k],
+                plan.p_BoF_H[k],
                 self._state.Eval(context),
             )
         )

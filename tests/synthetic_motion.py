@@ -1,4 +1,4 @@
-"""Motion made by formula: a Go2 that trots or paces with feet that do not slip."""
+"""Motion made by formula: a robot that trots or paces with feet that do not slip."""
 
 import numpy as np
 
@@ -21,9 +21,10 @@ def synthetic_motion(
     phase: float = 0.0,
     recording: str = "made",
     split: str = "train",
+    name: str = "go2",
 ) -> Motion:
     """Returns a motion along an arc; the speed in m/s, the turn in rad/s."""
-    robot = get_robot("go2")
+    robot = get_robot(name)
     time = np.arange(round(seconds * FPS) + 1) / FPS
     yaw = turn * time
     path = np.stack((np.cos(yaw), np.sin(yaw)), axis=-1) * speed / FPS
@@ -47,7 +48,7 @@ def synthetic_motion(
     pitch = 0.03 * np.sin(beat)
     q_HB[:, 0], q_HB[:, 2] = np.cos(pitch / 2), np.sin(pitch / 2)
     return make_motion(
-        robot="go2",
+        robot=name,
         label=parse_label(label),
         joint_names=robot.joint_names,
         base_position=p_WB,

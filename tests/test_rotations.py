@@ -1,4 +1,4 @@
-"""Held against scipy, single quaternions and arrays of them alike."""
+"""Held against scipy, single quaternions and arrays of them."""
 
 import numpy as np
 import pytest

@@ -18,7 +18,7 @@ from loco_drake.cli.training import print_stopped
 from loco_drake.errors import InputError
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot
-from loco_drake.tracking.environment import EnvironmentConfig
+from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.references import load_references
 from loco_drake.tracking.train import Progress as TrainingProgress
 from loco_drake.tracking.train import TrainingConfig, train_tracker

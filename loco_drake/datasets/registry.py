@@ -126,20 +126,27 @@ def read_clip(
     return replace(clip, provenance={**clip.provenance, **origin})
 
 
-def data_dir(path: Path | None = None) -> Path:
-    """Returns the folder of the recordings.
+def data_target(path: Path | None = None) -> Path:
+    """Returns where the folder of the recordings is, or is to be.
 
     It is ``path`` if given, else that of the variable ``LOCO_DRAKE_DATA``, else
     ``data`` in the user's cache folder.
+    """
+    given = path or os.environ.get(DATA_VARIABLE)
+    return Path(given) if given else cache_dir() / "data"
+
+
+def data_dir(path: Path | None = None) -> Path:
+    """Returns the folder of the recordings, as :func:`data_target` chooses it.
 
     Raises:
         InputError: if there is no such folder.
     """
-    given = path or os.environ.get(DATA_VARIABLE)
-    folder = Path(given) if given else cache_dir() / "data"
+    folder = data_target(path)
     if not folder.is_dir():
         raise InputError(
-            f"There is no data folder {str(folder)!r}: name one with --data-dir or "
-            f"the environment variable {DATA_VARIABLE}."
+            f"There is no data folder {str(folder)!r}: loco-drake data fetch downloads "
+            "the recordings, or name a folder with --data-dir or the environment "
+            f"variable {DATA_VARIABLE}."
         )
     return folder

@@ -9,6 +9,8 @@ from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
 
 from loco_drake.systems.actor import OBSERVATION_CLIP, Actor, ActorConfig
+from loco_drake.systems.observation import OBSERVATION_SIZE
+from loco_drake.tracking.symmetric_policy import SymmetricPolicy, SymmetricStatistics
 
 
 @dataclass(kw_only=True)
@@ -107,8 +109,9 @@ def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
         clip_obs=OBSERVATION_CLIP,
         gamma=config.gamma,
     )
+    normalized.obs_rms = cast(Any, SymmetricStatistics(shape=(OBSERVATION_SIZE,)))
     learner = AdaptivePPO(
-        "MlpPolicy",
+        SymmetricPolicy,
         normalized,
         learning_rate=config.actor_rate,
         n_steps=config.batch // environment.num_envs,

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import gymnasium
 
 if TYPE_CHECKING:
-    from loco_drake.tracking.environment import EnvironmentConfig, TrackingEnv
+    from loco_drake.tracking.config import EnvironmentConfig
+    from loco_drake.tracking.environment import TrackingEnv
 
 
 def register() -> None:
@@ -42,7 +43,8 @@ def make_tracking(
         seed: of what is generated.
     """
     from loco_drake.models.robots import get_robot
-    from loco_drake.tracking.environment import EnvironmentConfig, TrackingEnv
+    from loco_drake.tracking.config import EnvironmentConfig
+    from loco_drake.tracking.environment import TrackingEnv
     from loco_drake.tracking.references import generate_references, load_references
 
     config = config or EnvironmentConfig()

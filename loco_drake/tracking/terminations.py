@@ -31,17 +31,16 @@ def is_lost(
     config: TerminationConfig,
     state: NDArray[np.float64],
     plan_state: NDArray[np.float64],
-) -> bool:
-    """Returns whether the robot fell or is too far from its plan to come back.
+) -> NDArray[np.bool_]:
+    """Returns whether each robot fell or is too far from its plan to come back, (...).
 
     Args:
         robot: the robot.
         config: how far is too far.
-        state: the plant's [q, v].
+        state: the plant's [q, v], shape (..., 37).
         plan_state: the same of the plan.
     """
-    if has_fallen(robot, state):
-        return True
-    gap = state[4:7] - plan_state[4:7]
-    turn = quat_error(state[:4], plan_state[:4])
-    return bool(gap @ gap > config.position**2 or turn @ turn > config.rotation**2)
+    gap = np.linalg.norm(state[..., 4:7] - plan_state[..., 4:7], axis=-1)
+    turn = np.linalg.norm(quat_error(state[..., :4], plan_state[..., :4]), axis=-1)
+    strayed = (gap > config.position) | (turn > config.rotation)
+    return has_fallen(robot, state[..., :19]) | strayed

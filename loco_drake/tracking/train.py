@@ -21,7 +21,7 @@ from loco_drake.tracking.checkpoint import (
     restore,
     save_checkpoint,
 )
-from loco_drake.tracking.environment import EnvironmentConfig
+from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.ppo import AdaptivePPO, PpoConfig, export_actor, make_ppo
 from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.workers import WorkerVecEnv

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from loco_drake.systems.plan import Plan
-from loco_drake.tracking.environment import EnvironmentConfig, TrackingEnv
+from loco_drake.tracking.batch import TrackingBatch
+from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
 from loco_drake.tracking.sampler import PlanSampler
 
 
@@ -26,42 +28,46 @@ def _work(
     """Serves one message after the other: actions and the plans to go on with."""
     # Ctrl-C reaches the whole group; the trainer decides what becomes of it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # All environments of a process share one diagram; each has a Context of its own.
-    environments = [TrackingEnv(plans, config) for _ in seeds]
-    for environment, seed in zip(environments, seeds, strict=True):
-        environment.reset(seed=seed)
+    batch = TrackingBatch(plans, config, len(seeds))
+    random = [np.random.default_rng(seed) for seed in seeds]
     try:
         while (message := pipe.recv()) is not None:
             actions, next_plans = message
-            results = []
-            for i, environment in enumerate(environments):
-                if actions is None:
-                    observation, info = environment.reset(
-                        options={"plan": next_plans[i]}
-                    )
-                    results.append((observation, 0.0, False, info))
-                else:
-                    results.append(_step(environment, actions[i], next_plans[i]))
-            pipe.send(results)
+            if actions is None:
+                for i in range(len(seeds)):
+                    batch.reset(i, random[i], next_plans[i])
+                pipe.send(batch.observe())
+            else:
+                pipe.send(_step(batch, actions, next_plans, random))
     except (EOFError, BrokenPipeError):
         pass  # The trainer is gone.
 
 
 def _step(
-    environment: TrackingEnv, action: NDArray[np.float32], next_plan: int
-) -> tuple[NDArray[np.float32], float, bool, dict[str, Any]]:
-    """Steps and, where the episode ends, resets, as VecEnv wants it."""
-    observation, reward, terminated, truncated, info = environment.step(action)
-    done = terminated or truncated
-    if done:
-        info["TimeLimit.truncated"] = truncated
-        info["terminal_observation"] = observation
-        observation, _ = environment.reset(options={"plan": next_plan})
-    return observation, reward, done, info
+    batch: TrackingBatch,
+    actions: NDArray[np.float32],
+    next_plans: list[int],
+    random: list[np.random.Generator],
+) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], list[Any]]:
+    """Steps and, where episodes end, resets, as VecEnv wants it."""
+    terms, terminated, truncated = batch.step(actions)
+    observations = batch.observe()
+    done = terminated | truncated
+    infos: list[dict[str, Any]] = [{} for _ in next_plans]
+    for i in np.flatnonzero(done):
+        infos[i] = {
+            "plan": int(batch.plan[i]),
+            "TimeLimit.truncated": bool(truncated[i]),
+            "terminal_observation": observations[i].copy(),
+        }
+        batch.reset(int(i), random[i], next_plans[i])
+    if done.any():
+        observations = batch.observe()
+    return observations, terms.sum(axis=-1), done, infos
 
 
 class WorkerVecEnv(VecEnv):
-    """``workers * per_worker`` TrackingEnvs for stable-baselines3.
+    """``workers * per_worker`` environments for stable-baselines3.
 
     Args:
         plans: what to follow.
@@ -84,10 +90,7 @@ class WorkerVecEnv(VecEnv):
         per_worker: int,
         seed: int,
     ) -> None:
-        probe = TrackingEnv(plans, config)
-        super().__init__(
-            workers * per_worker, probe.observation_space, probe.action_space
-        )
+        super().__init__(workers * per_worker, OBSERVATION_SPACE, ACTION_SPACE)
         self._sampler = sampler
         self._episode_steps = config.episode_steps
         self._per_worker = per_worker
@@ -114,7 +117,7 @@ class WorkerVecEnv(VecEnv):
         self._send(None)
         self._returns[:] = 0
         self._lengths[:] = 0
-        return np.stack([result[0] for result in self._receive()])
+        return np.concatenate(self._receive())
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Tells every worker what to do."""
@@ -124,9 +127,9 @@ class WorkerVecEnv(VecEnv):
         self,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[Any]]:
         """Returns observations, rewards, dones and infos."""
-        observations, rewards, dones, infos = map(
-            list, zip(*self._receive(), strict=True)
-        )
+        parts = zip(*self._receive(), strict=True)
+        observations, rewards, dones = (np.concatenate(next(parts)) for _ in range(3))
+        infos = [info for part in next(parts) for info in part]
         self._returns += rewards
         self._lengths += 1
         for i in np.flatnonzero(dones):
@@ -143,12 +146,7 @@ class WorkerVecEnv(VecEnv):
             }
             self._returns[i] = 0
             self._lengths[i] = 0
-        return (
-            np.stack(observations),
-            np.array(rewards, dtype=np.float32),
-            np.array(dones),
-            infos,
-        )
+        return observations, rewards.astype(np.float32), dones, infos
 
     def close(self) -> None:
         """Ends the workers."""
@@ -175,7 +173,7 @@ class WorkerVecEnv(VecEnv):
         results: list[Any] = []
         for pipe in self._pipes:
             try:
-                results += pipe.recv()
+                results.append(pipe.recv())
             except (EOFError, ConnectionResetError):
                 raise RuntimeError("a worker process died") from None
         return results

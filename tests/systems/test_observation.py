@@ -7,7 +7,9 @@ from loco_drake.systems.observation import (
     LOOK_AHEAD,
     OBSERVATION_LAYOUT,
     OBSERVATION_SIZE,
+    Preview,
     observe,
+    preview,
 )
 from loco_drake.systems.plan import PLAN_DT, make_plan
 
@@ -32,7 +34,7 @@ def parts(observation):
 def test_each_part_is_what_the_layout_says(go2, trot, state):
     """By scipy's rotations, from the definitions."""
     action = np.linspace(-1, 1, 12)
-    seen = parts(observe(go2, trot, TIME, state, action))
+    seen = parts(observe(go2, preview(trot, TIME), state, action))
     R_WB = Rotation.from_quat(state[:4], scalar_first=True)
     yaw = np.arctan2(R_WB.as_matrix()[1, 0], R_WB.as_matrix()[0, 0])
     R_HW = Rotation.from_euler("z", -yaw)
@@ -90,17 +92,31 @@ def test_it_does_not_depend_on_where_the_robot_goes(go2, trot, state):
     )
     there = np.concatenate(moved(state[:19], state[19:]))
     np.testing.assert_allclose(
-        observe(go2, plan, TIME, there, action),
-        observe(go2, trot, TIME, state, action),
+        observe(go2, preview(plan, TIME), there, action),
+        observe(go2, preview(trot, TIME), state, action),
         atol=1e-9,
     )
 
 
 def test_at_the_plans_end_its_last_sample_is_shown(go2, trot, state):
-    seen = parts(observe(go2, trot, trot.end_time, state, np.zeros(12)))
+    seen = parts(observe(go2, preview(trot, trot.end_time), state, np.zeros(12)))
     joints = seen["plan_joints"].reshape(len(LOOK_AHEAD), 12)
     np.testing.assert_array_equal(joints, np.tile(joints[0], (len(LOOK_AHEAD), 1)))
 
 
+def test_many_robots_are_observed_at_once(go2, trot, state):
+    ahead = preview(trot, TIME)
+    many = Preview(
+        *(np.stack([x, x]) for x in (ahead.q, ahead.v, ahead.contacts, ahead.label))
+    )
+    states = np.stack([state, trot.state[30]])
+    seen = observe(go2, many, states, np.zeros((2, 12)))
+    for own, state_i in zip(seen, states, strict=True):
+        alone = observe(go2, ahead, state_i, np.zeros(12))
+        np.testing.assert_allclose(own, alone, rtol=1e-12, atol=1e-15)
+
+
 def test_the_layout_adds_up(go2, trot, state):
-    assert observe(go2, trot, TIME, state, np.zeros(12)).shape == (OBSERVATION_SIZE,)
+    assert observe(go2, preview(trot, TIME), state, np.zeros(12)).shape == (
+        OBSERVATION_SIZE,
+    )

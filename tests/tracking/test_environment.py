@@ -12,7 +12,9 @@ from loco_drake.rotations import yaw_of
 from loco_drake.systems.diagram import MakeLocomotionDiagram, PlaceOnPlan
 from loco_drake.systems.plan import PLAN_DT
 from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
-from loco_drake.tracking.environment import EnvironmentConfig, ResetNoise, TrackingEnv
+from loco_drake.tracking.batch import TrackingBatch
+from loco_drake.tracking.config import EnvironmentConfig, ResetNoise
+from loco_drake.tracking.environment import TrackingEnv
 from loco_drake.tracking.references import load_references
 from loco_drake.tracking.registration import make_tracking
 from tests.synthetic_motion import synthetic_motion
@@ -129,15 +131,23 @@ def test_same_seed_same_episode_other_seed_another(plans):
     assert (one[1] != other[1]).any()
 
 
-def test_environments_share_a_diagram_but_no_state(plans):
+def test_robots_of_a_batch_share_a_diagram_but_no_state(plans):
+    """Two side by side do what each does alone, to the last bit."""
     config = EnvironmentConfig(reset_noise=NO_NOISE)
-    first, second = TrackingEnv(plans, config), TrackingEnv(plans, config)
-    assert first._diagram is second._diagram
-    start, _ = first.reset(options={"plan": 0, "sample": 0})
-    second.reset(options={"plan": 1, "sample": 30})
-    for _ in range(5):
-        second.step(STILL + 1)
-    np.testing.assert_array_equal(first._observe(), start)
+    starts, actions = [(0, 0), (1, 30)], np.array([0.5, -0.5]) * np.ones((12, 2))
+
+    def run(robots):
+        batch = TrackingBatch(plans, config, len(robots))
+        for i, robot in enumerate(robots):
+            batch.reset(i, np.random.default_rng(0), *starts[robot])
+        terms = [batch.step(actions.T[robots])[0] for _ in range(10)]
+        return batch.observe(), np.array(terms)
+
+    both = run([0, 1])
+    for robot in range(2):
+        alone = run([robot])
+        np.testing.assert_array_equal(alone[0][0], both[0][robot])
+        np.testing.assert_array_equal(alone[1][:, 0], both[1][:, robot])
 
 
 def test_reset_noise_moves_and_turns_the_robot_as_a_whole(plans):
