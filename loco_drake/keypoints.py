@@ -1,6 +1,6 @@
 """Motion of any four-legged source as six points in space."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,10 @@ from loco_drake.gaits import SOURCES
 
 # Feet in the order of every array with a leg axis; left is +y.
 LEGS = ("FL", "FR", "RL", "RR")
+
+# Mirroring left-right, in the plane y = 0: swap FL<->FR and RL<->RR, turn y.
+MIRROR_LEGS = np.array([1, 0, 3, 2])
+MIRROR_POLAR = np.array([1.0, -1.0, 1.0])  # positions, velocities
 
 
 @dataclass(frozen=True)
@@ -57,3 +61,20 @@ class KeypointClip:
 
     def __len__(self) -> int:
         return len(self.withers)
+
+    def mirrored(self) -> "KeypointClip":
+        """Returns the clip reflected in the plane y = 0 (left for right)."""
+        return replace(
+            self,
+            withers=self.withers * MIRROR_POLAR,
+            hip=self.hip * MIRROR_POLAR,
+            toes=self.toes[:, MIRROR_LEGS] * MIRROR_POLAR,
+            provenance=mirrored_provenance(self.provenance),
+        )
+
+
+def mirrored_provenance(provenance: dict[str, str]) -> dict[str, str]:
+    """Returns the provenance of the mirror image; a mirror's mirror is the original."""
+    if "mirrored" in provenance:
+        return {key: text for key, text in provenance.items() if key != "mirrored"}
+    return {**provenance, "mirrored": "left-right"}

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from loco_drake.errors import InputError
 from loco_drake.files import atomic_path
 from loco_drake.gaits import GaitLabel
+from loco_drake.keypoints import MIRROR_LEGS, MIRROR_POLAR, mirrored_provenance
 from loco_drake.rotations import angular_velocity, quat_continuous
 
 SCHEMA_VERSION = 1
@@ -26,11 +27,9 @@ UNITS = {
     "contacts": "foot on the ground, FL FR RL RR",
 }
 
-# Mirroring left-right: swap the legs FL<->FR and RL<->RR, turn the hips' signs.
-MIRROR_LEGS = np.array([1, 0, 3, 2])
+# Mirroring left-right, of robots with three joints a leg: turn the hips' signs.
 MIRROR_JOINTS = np.array([3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8])
 MIRROR_JOINT_SIGNS = np.tile([-1.0, 1.0, 1.0], 4)
-MIRROR_POLAR = np.array([1.0, -1.0, 1.0])  # positions, velocities
 MIRROR_AXIAL = np.array([-1.0, 1.0, -1.0])  # angular velocities
 MIRROR_QUATERNION = np.array([1.0, -1.0, 1.0, -1.0])
 
@@ -93,7 +92,16 @@ class Motion:
         return replace(self, **{name: getattr(self, name)[start:end] for name in UNITS})
 
     def mirrored(self) -> "Motion":
-        """Returns the motion reflected in the plane y = 0 (left for right)."""
+        """Returns the motion reflected in the plane y = 0 (left for right).
+
+        Raises:
+            InputError: unless the robot has three joints a leg, like Go2 and A1.
+        """
+        if len(self.joint_names) != len(MIRROR_JOINTS):
+            raise InputError(
+                f"Only motion of {len(MIRROR_JOINTS)} joints, as of go2 and a1, can be "
+                f"mirrored, not {len(self.joint_names)}; mirror it when retargeting."
+            )
 
         def joints(values: NDArray[np.float64]) -> NDArray[np.float64]:
             return values[:, MIRROR_JOINTS] * MIRROR_JOINT_SIGNS
@@ -107,7 +115,7 @@ class Motion:
             base_angular_velocity=self.base_angular_velocity * MIRROR_AXIAL,
             joint_velocities=joints(self.joint_velocities),
             contacts=self.contacts[:, MIRROR_LEGS],
-            provenance={**self.provenance, "mirrored": "left-right"},
+            provenance=mirrored_provenance(self.provenance),
         )
 
 

@@ -13,13 +13,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from loco_drake.motion import (
-    MIRROR_AXIAL,
-    MIRROR_JOINT_SIGNS,
-    MIRROR_JOINTS,
-    MIRROR_LEGS,
-    MIRROR_POLAR,
-)
+from loco_drake.keypoints import MIRROR_LEGS, MIRROR_POLAR
+from loco_drake.motion import MIRROR_AXIAL, MIRROR_JOINT_SIGNS, MIRROR_JOINTS
 
 from .observation import OBSERVATION_LAYOUT
 

@@ -76,6 +76,17 @@ def test_mirroring_reflects_every_toe_in_the_plane_y_0(motion):
     np.testing.assert_array_equal(twice.joint_positions, motion.joint_positions)
 
 
+def test_only_three_joints_a_leg_can_be_mirrored(motion):
+    eight = replace(
+        motion,
+        joint_names=motion.joint_names[:8],
+        joint_positions=motion.joint_positions[:, :8],
+        joint_velocities=motion.joint_velocities[:, :8],
+    )
+    with pytest.raises(InputError, match="Only motion of 12 joints, as of go2 and a1"):
+        eight.mirrored()
+
+
 def test_slices(motion):
     part = motion.slice(10, 30)
     assert len(part) == 20

@@ -1,7 +1,7 @@
 """The command ``evaluate retargeting``."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from loco_drake.datasets.segments import read_segments, select_labels
 from loco_drake.errors import InputError, check_choice
 from loco_drake.evaluation.retargeting import score_segments, summarize
 from loco_drake.models.robots import ROBOTS, get_robot
+from loco_drake.retargeting.variants import Variant
 
 
 @dataclass(kw_only=True)
@@ -28,6 +29,10 @@ class EvaluateRetargeting:
     """The robot: go2, a1 or all."""
     labels: tuple[str, ...] = ()
     """Such as dog-trot dog-pace. Default: all that segments.csv holds."""
+    mirror: bool = False
+    """Exchanges left and right."""
+    froude: bool = False
+    """Scales time for the animal's Froude number, as in loco-drake retarget."""
     data_dir: Path | None = None
     """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
     workers: int = 1
@@ -50,15 +55,18 @@ class EvaluateRetargeting:
             raise InputError(f"--seeds must be 1 or more, not {self.seeds}.")
         segments = select_labels(read_segments(data_dir(self.data_dir)), self.labels)
         names = list(ROBOTS) if self.robot == "all" else [self.robot]
+        variant = Variant(mirror=self.mirror, froude=self.froude)
         robots: dict[str, Any] = {}
         with Progress(console=Console(stderr=True), transient=True) as progress:
             for name in names:
-                scores = score_segments(segments, get_robot(name), self.workers)
+                scores = score_segments(
+                    segments, get_robot(name), self.workers, variant
+                )
                 tracked = progress.track(
                     scores, total=len(segments), description=f"Retargeting to {name}"
                 )
                 robots[name] = summarize(list(tracked))
-        write_json(self.json, {"robots": robots})
+        write_json(self.json, {"robots": robots, **asdict(variant)})
         for name, result in robots.items():
             speed = result["frames_per_second"] or 0.0
             title = f"{name}: {speed:.0f} frames/s in one process"

@@ -26,6 +26,7 @@ from loco_drake.retargeting.trajectories import (
     choose_windows,
     write_trajectories,
 )
+from loco_drake.retargeting.variants import Variant
 
 
 @dataclass(kw_only=True)
@@ -54,8 +55,15 @@ class Retarget:
     """Frame of FILE after the last. Default: the end of the file."""
     fps: float | None = None
     """Rate of FILE in frames/s. Default: what its format, name or motion tells."""
+    mirror: bool = False
+    """Exchanges left and right."""
+    froude: bool = False
+    """Scales time for the animal's Froude number, v^2 / (g h): the motion of a robot
+    that is a quarter as high as the animal lasts half as long, and a larger robot's
+    longer. Without it the animal's own timing is kept."""
     out: Path | None = None
-    """Folder for the Motion files. Default: motions/ROBOT."""
+    """Folder for the Motion files. Default: motions/ROBOT, with -mirrored and -froude
+    behind it where these are asked for."""
     trajectories: int = 10
     """How many 2 s trajectories to cut for each of the fifteen labels, as far as the
     recordings hold as many; 0: none. With FILE there are none."""
@@ -80,11 +88,14 @@ class Retarget:
                 f"--trajectories must be 0 or more, not {self.trajectories}."
             )
         segments, split = self._segments()
-        out = self.out or Path("motions") / self.robot
+        variant = Variant(mirror=self.mirror, froude=self.froude)
+        out = self.out or Path("motions") / f"{self.robot}{variant.suffix}"
         outcomes: list[Outcome] = []
         with Progress(console=Console(stderr=True), transient=True) as progress:
             task = progress.add_task("Retargeting", total=len(segments))
-            for outcome in retarget_segments(segments, robot, out, split, self.workers):
+            for outcome in retarget_segments(
+                segments, robot, out, split, self.workers, variant
+            ):
                 outcomes.append(outcome)
                 progress.advance(task)
         failed = [outcome for outcome in outcomes if outcome.error is not None]
@@ -92,7 +103,8 @@ class Retarget:
             raise InputError(str(failed[0].error))
         write_json(self.json, {o.segment.name: _figures(o) for o in outcomes})
         rows = [_row(outcome) for outcome in outcomes if outcome.report is not None]
-        print_table(f"Motion files in {out}: {len(rows)}", list(_COLUMNS), rows)
+        title = f"Motion files in {out}: {len(rows)}{', mirrored' * self.mirror}"
+        print_table(title, list(_COLUMNS), rows)
         if split is not None and self.trajectories:
             self._cut(outcomes, split, out.parent / f"{out.name}-trajectories")
         print_failed((o.segment.name, str(o.error)) for o in failed)
@@ -151,6 +163,7 @@ def _figures(outcome: Outcome) -> dict[str, object]:
 _COLUMNS = {
     "clip": "",
     "frames": "frames",
+    "time scale": "time_scale",
     "frames/s": "frames_per_second",
     "slip mm/s": "stance_slip_median_mps",
     "sunk mm": "penetration_max_m",

@@ -37,6 +37,7 @@ from loco_drake.motion_quality import stance_slip_speeds, toe_trajectories
 from loco_drake.parallel import map_in_workers
 from loco_drake.retargeting.batch import SegmentRetargeter
 from loco_drake.retargeting.retarget import RetargetReport
+from loco_drake.retargeting.variants import AS_RECORDED, Variant
 
 Array = NDArray[np.float64]
 
@@ -80,8 +81,8 @@ class FailedClip:
 class _Scorer:
     """Retargets and scores, see :func:`score_segments`."""
 
-    def __init__(self, robot: str) -> None:
-        self._retarget = SegmentRetargeter(get_robot(robot))
+    def __init__(self, robot: str, variant: Variant) -> None:
+        self._retarget = SegmentRetargeter(get_robot(robot), variant=variant)
 
     def __call__(self, segment: Segment) -> ClipScore | FailedClip:
         result = self._retarget(segment)
@@ -100,7 +101,10 @@ class _Scorer:
 
 
 def score_segments(
-    segments: Iterable[Segment], robot: Robot, workers: int = 1
+    segments: Iterable[Segment],
+    robot: Robot,
+    workers: int = 1,
+    variant: Variant = AS_RECORDED,
 ) -> Iterator[ClipScore | FailedClip]:
     """Retargets segments, and yields the figures of each, in their order.
 
@@ -110,8 +114,10 @@ def score_segments(
         segments: from :func:`loco_drake.datasets.segments.read_segments`.
         robot: to move.
         workers: processes.
+        variant: what to change of the recordings; the rhythm is compared with theirs
+            in the motion's time.
     """
-    return map_in_workers(partial(_Scorer, robot.name), segments, workers)
+    return map_in_workers(partial(_Scorer, robot.name, variant), segments, workers)
 
 
 def summarize(scores: Sequence[ClipScore | FailedClip]) -> dict[str, Any]:

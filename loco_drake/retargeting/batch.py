@@ -16,6 +16,7 @@ from loco_drake.parallel import map_in_workers
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import RetargetReport, retarget_clip
 from loco_drake.retargeting.trajectories import Stretch
+from loco_drake.retargeting.variants import AS_RECORDED, Variant
 
 
 @dataclass(frozen=True)
@@ -41,23 +42,33 @@ class SegmentRetargeter:
     Args:
         robot: to move.
         split: gives the side that goes into the provenance; None leaves it out.
+        variant: what to change of the recordings.
     """
 
-    def __init__(self, robot: Robot, split: Split | None = None) -> None:
+    def __init__(
+        self, robot: Robot, split: Split | None = None, variant: Variant = AS_RECORDED
+    ) -> None:
         self.robot = robot
         self._split = split
+        self._variant = variant
         self._solver = LegSolver(robot, FPS)
 
     def __call__(
         self, segment: Segment
     ) -> tuple[KeypointClip, Motion, RetargetReport] | str:
-        """Returns clip, motion and report, or the sentence that says what failed."""
+        """Returns clip, motion and report, or the sentence that says what failed.
+
+        The clip is the variant, in the time of the motion, to compare the motion with.
+        """
         try:
             clip = segment.read()
             if self._split is not None:
                 side = {"split": self._split.side(segment)}
                 clip = replace(clip, provenance={**clip.provenance, **side})
-            return clip, *retarget_clip(clip, self.robot, solver=self._solver)
+            motion, report = retarget_clip(
+                clip, self.robot, solver=self._solver, variant=self._variant
+            )
+            return self._variant.apply(clip, report.scale), motion, report
         except InputError as error:
             return str(error)
         except (ArithmeticError, LookupError, RuntimeError, ValueError) as error:
@@ -68,8 +79,10 @@ class SegmentRetargeter:
 class _Writer:
     """Retargets and saves, see :func:`retarget_segments`."""
 
-    def __init__(self, robot: str, out_dir: Path, split: Split | None) -> None:
-        self._retarget = SegmentRetargeter(get_robot(robot), split)
+    def __init__(
+        self, robot: str, out_dir: Path, split: Split | None, variant: Variant
+    ) -> None:
+        self._retarget = SegmentRetargeter(get_robot(robot), split, variant)
         self._out_dir = out_dir
 
     def __call__(self, segment: Segment) -> Outcome:
@@ -88,6 +101,7 @@ def retarget_segments(
     out_dir: Path,
     split: Split | None = None,
     workers: int = 1,
+    variant: Variant = AS_RECORDED,
 ) -> Iterator[Outcome]:
     """Retargets segments, and writes ``out_dir/SEGMENT.npz`` for each.
 
@@ -100,11 +114,12 @@ def retarget_segments(
         out_dir: made if need be; files of the same name are replaced.
         split: gives the side that goes into the provenance; None leaves it out.
         workers: processes.
+        variant: what to change of the recordings.
 
     Yields:
         One outcome for each segment, in their order, as soon as it is done.
     """
-    make = partial(_Writer, robot.name, Path(out_dir), split)
+    make = partial(_Writer, robot.name, Path(out_dir), split, variant)
     return map_in_workers(make, segments, workers)
 
 
@@ -119,6 +134,7 @@ def stretches_of(outcomes: Iterable[Outcome], split: Split) -> list[Stretch]:
             side=split.side(outcome.segment),
             start=outcome.segment.start / outcome.segment.fps,
             frames=outcome.report.frames,
+            rate=FPS * outcome.report.time_scale,
         )
         for outcome in outcomes
         if outcome.report is not None

@@ -24,6 +24,12 @@ from loco_drake.retargeting.scaling import (
 )
 from loco_drake.retargeting.smoothing import smooth
 from loco_drake.retargeting.trunk import folded_length, raise_trunk
+from loco_drake.retargeting.variants import (
+    AS_RECORDED,
+    Variant,
+    in_time,
+    smoothing_in_time,
+)
 from loco_drake.rotations import quat_rotate
 
 
@@ -42,6 +48,8 @@ class RetargetReport:
         joint_limit_violations: number of joint angles.
         joint_speed_ratio_max: highest speed over its limit.
         scale: the robot's stance height over the animal's.
+        time_scale: how long the motion lasts, over the recording.
+        mirrored: whether left and right are exchanged.
     """
 
     frames: int
@@ -54,6 +62,8 @@ class RetargetReport:
     joint_limit_violations: int
     joint_speed_ratio_max: float
     scale: float
+    time_scale: float
+    mirrored: bool
 
 
 def retarget_clip(
@@ -62,6 +72,7 @@ def retarget_clip(
     *,
     config: RetargetConfig | None = None,
     solver: LegSolver | None = None,
+    variant: Variant = AS_RECORDED,
 ) -> tuple[Motion, RetargetReport]:
     """Returns ``clip`` as a motion of ``robot`` at 50 Hz, and how good it is.
 
@@ -70,6 +81,7 @@ def retarget_clip(
         robot: to move.
         config: of the clip's source; the shipped one if None.
         solver: of this robot, to be used again for many clips.
+        variant: the clip mirrored, or in time for the animal's Froude number.
 
     Raises:
         InputError: if the clip is too short or not of an animal on its feet.
@@ -77,12 +89,16 @@ def retarget_clip(
     began = time.perf_counter()
     config = config or load_config(clip.source)
     solver = solver or LegSolver(robot, FPS)
+    clip = clip.mirrored() if variant.mirror else clip
     height = stance_height(clip, config)
+    scale = robot.stand_height / height
     raw_contacts = detect_contacts(clip, height, config.contact)
-    resampled = resample(clip, FPS)
+    time_scale = variant.time_scale(scale)
+    timed = in_time(clip, time_scale)
+    resampled = resample(timed, FPS)
     formula = scale_to_robot(resampled, height, robot, config)
-    contacts = resample_contacts(raw_contacts, clip.fps, FPS, len(resampled))
-    targets = correct(formula, contacts, robot, config)
+    contacts = resample_contacts(raw_contacts, timed.fps, FPS, len(resampled))
+    targets = correct(formula, contacts, robot, smoothing_in_time(config, time_scale))
     joints = solver.solve(targets.p_BF)
     motion = make_motion(
         robot=robot.name,
@@ -92,7 +108,7 @@ def retarget_clip(
         base_quaternion=targets.q_WB,
         joint_positions=joints,
         contacts=contacts,
-        provenance=clip.provenance,
+        provenance=timed.provenance,
     )
     seconds = time.perf_counter() - began
     p_WF = quality.toe_trajectories(motion, robot)
@@ -106,7 +122,9 @@ def retarget_clip(
         penetration_max_m=quality.penetration_max(p_WF, robot.foot_radius),
         joint_limit_violations=quality.joint_limit_violations(joints, robot),
         joint_speed_ratio_max=quality.joint_speed_ratio_max(joints, robot, FPS),
-        scale=robot.stand_height / height,
+        scale=scale,
+        time_scale=time_scale,
+        mirrored=variant.mirror,
     )
     kept = ("scale", "toe_error_rmse_m", "correction_rmse_m")
     figures = {name: f"{getattr(report, name):.6g}" for name in kept}

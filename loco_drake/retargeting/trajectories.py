@@ -45,7 +45,8 @@ def cut(motion: Motion, start: int, size: int) -> Motion:
     provenance = dict(motion.provenance)
     if {"frames", "recording_fps"} <= set(provenance):
         first = int(provenance["frames"].split("-")[0])
-        rate = float(provenance["recording_fps"]) / motion.fps
+        time_scale = float(provenance.get("time_scale", 1.0))
+        rate = float(provenance["recording_fps"]) / (motion.fps * time_scale)
         ends = (first + start * rate, first + (start + size - 1) * rate + 1)
         provenance["frames"] = f"{int(ends[0])}-{int(np.ceil(ends[1]))}"
     return replace(motion.slice(start, start + size), provenance=provenance)
@@ -63,6 +64,7 @@ class Stretch:
         side: of the split.
         start: when it starts in the recording, s.
         frames: of its motion.
+        rate: frames of its motion for each second of the recording.
     """
 
     path: Path
@@ -72,6 +74,7 @@ class Stretch:
     side: str
     start: float
     frames: int
+    rate: float = FPS
 
 
 @dataclass(frozen=True)
@@ -85,8 +88,8 @@ class Window:
     @property
     def interval(self) -> tuple[float, float]:
         """First and last moment within the recording, s."""
-        first = self.stretch.start + self.start / FPS
-        return first, first + self.size / FPS
+        first = self.stretch.start + self.start / self.stretch.rate
+        return first, first + self.size / self.stretch.rate
 
 
 def choose_windows(
@@ -192,7 +195,7 @@ def _offers(
 
 def _frames_of(interval: tuple[float, float], stretch: Stretch) -> tuple[int, int]:
     """Returns the frames of a stretch that a time of its recording touches."""
-    first, last = ((t - stretch.start) * FPS for t in interval)
+    first, last = ((t - stretch.start) * stretch.rate for t in interval)
     return int(np.floor(first + 1e-6)), int(np.ceil(last - 1e-6))
 
 

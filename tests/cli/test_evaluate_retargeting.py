@@ -52,6 +52,20 @@ def test_both_robots_with_a_bad_clip(made_data, tmp_path, capsys):
             assert all(isinstance(figures[key], int | float) for key in KEYS)
 
 
+def test_rhythm_of_a_mirrored_motion_in_its_own_time_is_compared_with_its_clip(
+    made_data, tmp_path
+):
+    """A gallop is not its own mirror image, and .6 times as long is 40 % off."""
+    options = ("--data-dir", made_data, "--labels", "dog-gallop")
+    both = ("--mirror", "--froude", "--json", tmp_path / "a.json")
+    assert command(*options, *both).run() == 0
+    result = json.loads((tmp_path / "a.json").read_text())
+    assert (result["mirror"], result["froude"]) == (True, True)
+    figures = result["robots"]["go2"]["labels"]["dog-gallop"]
+    assert figures["stride_period_error"] < 0.01
+    assert figures["phase_lag_error"] < 0.02
+
+
 def test_wrong_input_raises_one_sentence(made_data, tmp_path):
     data = ("--data-dir", made_data)
     wrong = {

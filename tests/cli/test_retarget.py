@@ -5,6 +5,7 @@ import tyro
 
 from loco_drake.cli.retarget import Retarget
 from loco_drake.errors import InputError
+from loco_drake.models.robots import get_robot
 from loco_drake.motion import load_motion
 from tests.synthetic_horse import make_horse, write_world_recording
 from tests.synthetic_robots import write_mpc_recording, write_solo8_recording
@@ -67,6 +68,42 @@ def test_one_file_with_a_stretch_for_the_a1(made_data, tmp_path):
     motion = load_motion(tmp_path / "dog-trot-made_trot-60-180.npz")
     assert motion.robot == "a1"
     assert len(motion) == 100  # 119 steps of 1/60 s are 99.2 of 20 ms
+
+
+def test_mirrored_in_its_own_time_goes_to_a_folder_of_its_own(
+    made_data, tmp_path, monkeypatch, capsys
+):
+    """The dog's .44 m to the Go2's height: the root of the ratio, in all outputs."""
+    monkeypatch.chdir(tmp_path)
+    options = ("--data-dir", made_data, "--gait", "trot", "--trajectories", 1)
+    both = ("--mirror", "--froude", "--json", "a.json")
+    assert command(*options, *both).run() == 0
+    name = "dog-trot-made_trot-0-240"
+    motion = load_motion(tmp_path / "motions" / "go2-mirrored-froude" / f"{name}.npz")
+    (cut,) = (tmp_path / "motions" / "go2-mirrored-froude-trajectories").iterdir()
+    time_scale = (get_robot("go2").stand_height / 0.44) ** 0.5
+    figures = json.loads((tmp_path / "a.json").read_text())[name]
+    assert figures["time_scale"] == pytest.approx(time_scale, rel=1e-3)
+    assert figures["mirrored"] is True
+    assert len(motion) == int(239 / 60 * time_scale * 50) + 1
+    for part in (motion, load_motion(cut)):
+        assert part.provenance["mirrored"] == "left-right"
+        assert float(part.provenance["time_scale"]) == pytest.approx(
+            time_scale, rel=1e-3
+        )
+    printed = capsys.readouterr().out
+    assert "mirrored" in printed
+    assert f" {time_scale:.2f} " in printed
+
+
+def test_help_explains_the_options(capsys):
+    with pytest.raises(SystemExit):
+        command("--help")
+    page = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "--mirror" in page
+    assert "Exchanges left and right" in page
+    assert "--froude" in page
+    assert "Scales time for the animal's Froude number" in page
 
 
 def test_bad_clip_in_a_batch_is_reported_with_status_1(made_data, tmp_path, capsys):

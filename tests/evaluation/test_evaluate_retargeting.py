@@ -28,6 +28,8 @@ def score(gait="trot", name="a", frames=100, fidelity=None, slips=(), **changes)
         "joint_limit_violations": 0,
         "joint_speed_ratio_max": 0.5,
         "scale": 1.0,
+        "time_scale": 1.0,
+        "mirrored": False,
     }
     return ClipScore(
         segment=Segment("dog", Path(f"{name}.txt"), gait, 0, 100, 60.0),

@@ -51,6 +51,29 @@ def test_a_motion_of_five_seconds_holds_two_trajectories_in_its_middle():
         trajectories(motion, seconds=0.0)
 
 
+def test_frames_of_a_motion_in_its_own_time_are_those_of_the_recording():
+    """It lasts .5 times as long: 25 frames at 50 Hz are 1 s, 60 of the recording.
+
+    The last frame, 99 frames later, is 99 / 25 s or 237.6 frames after the first.
+    """
+    motion = synthetic_motion("dog-trot", 5.0)
+    origin = {"frames": "300-901", "recording_fps": "60", "time_scale": "0.5"}
+    first, second = trajectories(replace(motion, provenance=origin))
+    assert first.provenance["frames"] == "360-599"
+    assert second.provenance["frames"] == "600-839"
+
+
+def test_overlap_is_judged_in_the_time_of_the_recording():
+    """Both 4 s of a recording, 100 frames at twice its pace; one starts 3 s later.
+
+    In the motion's time they would be apart, 0 to 2 s and 3 to 5 s.
+    """
+    stretches = [replace(stretch("r", start=s), rate=25.0) for s in (0.0, 3.0)]
+    assert len(choose_windows(stretches, 4)) == 1
+    assert choose_windows(stretches[:1], 1)[0].interval == (0.0, 4.0)
+    assert len(choose_windows([stretch("r"), stretch("r", start=3.0)], 4)) == 2
+
+
 def test_the_middle_of_each_stretch_comes_first():
     windows = choose_windows([stretch(f"r{i}", frames=330) for i in range(4)], 4)
     assert [w.start for w in windows] == [115] * 4
