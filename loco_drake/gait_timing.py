@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.keypoints import LEGS, KeypointClip
-from loco_drake.models.robots import Robot
+from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion import Motion
 from loco_drake.motion_quality import toe_trajectories
 from loco_drake.rotations import yaw_of
@@ -106,7 +106,7 @@ def clip_track(clip: KeypointClip, stance_height: float) -> Track:
     )
 
 
-def motion_track(motion: Motion, robot: Robot) -> Track:
+def motion_track(motion: Motion, robot: Quadruped) -> Track:
     """Returns the track of a robot's motion, by its kinematics."""
     soles = toe_trajectories(motion, robot) - [0.0, 0.0, robot.foot_radius]
     return Track(

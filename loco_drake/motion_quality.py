@@ -7,8 +7,7 @@ never from contact labels, so that it means the same for a motion from anywhere.
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.models.kinematics import toe_positions
-from loco_drake.models.robots import Robot
+from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion import Motion
 from loco_drake.rotations import quat_rotate
 
@@ -20,9 +19,9 @@ STANCE_HEIGHT = 0.010
 _LIMIT_TOLERANCE = 1e-6
 
 
-def toe_trajectories(motion: Motion, robot: Robot) -> Array:
+def toe_trajectories(motion: Motion, robot: Quadruped) -> Array:
     """Returns the centres of the toe spheres p_WF in m, shape (T, 4, 3)."""
-    p_BF = toe_positions(robot, motion.joint_positions)
+    p_BF = robot.toe_positions(motion.joint_positions)
     p_WF: Array = motion.base_position[:, None] + quat_rotate(
         motion.base_quaternion[:, None], p_BF
     )
@@ -62,17 +61,17 @@ def penetration_max(p_WF: Array, foot_radius: float) -> float:
     return float(max(0.0, foot_radius - p_WF[..., 2].min()))
 
 
-def joint_limit_violations(joints: Array, robot: Robot) -> int:
-    """Returns how many angles of ``joints`` (T, 12) lie outside the position limits."""
+def joint_limit_violations(joints: Array, robot: Quadruped) -> int:
+    """Returns how many angles of ``joints`` (T, J) lie outside the position limits."""
     below = joints < robot.joint_lower - _LIMIT_TOLERANCE
     above = joints > robot.joint_upper + _LIMIT_TOLERANCE
     return int((below | above).sum())
 
 
-def joint_speed_ratio_max(joints: Array, robot: Robot, fps: float) -> float:
+def joint_speed_ratio_max(joints: Array, robot: Quadruped, fps: float) -> float:
     """Returns the highest joint speed over its limit: 1 is just allowed.
 
-    Speeds are those between consecutive frames of ``joints`` (T, 12).
+    Speeds are those between consecutive frames of ``joints`` (T, J).
     """
     speeds = np.abs(np.diff(joints, axis=0)) * fps
     return float((speeds / robot.joint_speed_limits).max())

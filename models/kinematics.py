@@ -9,15 +9,18 @@ down at zero, and angles a, b, c,
 Arrays have any leading shape; legs are FL, FR, RL, RR.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
-from .robots import Robot
+if TYPE_CHECKING:  # robots.py imports this module
+    from .robots import Robot
 
 Array = NDArray[np.float64]
 
 
-def toe_positions(robot: Robot, joints: Array) -> Array:
+def toe_positions(robot: "Robot", joints: Array) -> Array:
     """Returns the centres of the toe spheres.
 
     Args:
@@ -40,7 +43,7 @@ def toe_positions(robot: Robot, joints: Array) -> Array:
     return p_BF
 
 
-def toe_jacobians(robot: Robot, joints: Array) -> Array:
+def toe_jacobians(robot: "Robot", joints: Array) -> Array:
     """Returns each toe's Jacobian with respect to its own leg's joints.
 
     Args:
@@ -70,7 +73,7 @@ def toe_jacobians(robot: Robot, joints: Array) -> Array:
     return J
 
 
-def leg_joints(robot: Robot, p_BF: Array) -> Array:
+def leg_joints(robot: "Robot", p_BF: Array) -> Array:
     """Returns joints that put the toes at ``p_BF``.
 
     Of the solutions, this is the one with the foot below the hip's axis, in the plane
@@ -97,6 +100,60 @@ def leg_joints(robot: Robot, p_BF: Array) -> Array:
     b = np.arctan2(-x, -height) - np.arctan2(l2 * np.sin(c), l1 + l2 * np.cos(c))
     joints = np.stack((_wrap(a), _wrap(b), c), axis=-1)
     return joints.reshape(*joints.shape[:-2], 12)
+
+
+def knee_positions(robot: "Robot", joints: Array) -> Array:
+    """Returns the origins of the calf joints.
+
+    Args:
+        robot: whose legs.
+        joints: rad, shape (..., 12).
+
+    Returns:
+        In B, m, shape (..., 4, 3).
+    """
+    a, b, _ = _split(joints)
+    d, down = robot.abduction_offset, -robot.thigh_length * np.cos(b)
+    p_BKnee: Array = robot.p_BHip + np.stack(
+        (
+            -robot.thigh_length * np.sin(b),
+            np.cos(a) * d - np.sin(a) * down,
+            np.sin(a) * d + np.cos(a) * down,
+        ),
+        axis=-1,
+    )
+    return p_BKnee
+
+
+def folded_length(robot: "Robot") -> float:
+    """Returns how near in m a toe can be to its thigh joint, the calf at its limit."""
+    l1, l2 = robot.thigh_length, robot.calf_length
+    square = l1**2 + l2**2 + 2 * l1 * l2 * np.cos(robot.joint_lower[2])
+    return float(np.sqrt(square))
+
+
+def reachable_toes(robot: "Robot", p_BF: Array) -> Array:
+    """Returns where the joints' limits let the toes be, near ``p_BF``.
+
+    A toe nearer to its hip than the leg folds is moved down the trunk's z axis. A leg
+    that is too short points at its target.
+
+    Args:
+        robot: whose legs.
+        p_BF: centres of the toe spheres in m, shape (..., 4, 3).
+
+    Returns:
+        In B, m, shape (..., 4, 3).
+    """
+    x, y, z = np.moveaxis(p_BF - robot.p_BHip, -1, 0)
+    # In the plane of the leg, whose distance from the hip's axis is the offset.
+    square = 1.001 * folded_length(robot) ** 2 + robot.abduction_offset**2
+    drop = np.sqrt(np.maximum(square - x**2 - y**2, 0.0))
+    lowered = p_BF.copy()
+    lowered[..., 2] = np.minimum(p_BF[..., 2], robot.p_BHip[:, 2] - drop)
+    folds = x**2 + y**2 + z**2 < square
+    goal = np.where(folds[..., None], lowered, p_BF)
+    return toe_positions(robot, robot.nearest_joints(goal))
 
 
 def _split(joints: Array) -> tuple[Array, Array, Array]:

@@ -5,7 +5,7 @@ Drake reads no Collada. The Go2's and A1's meshes of the PyPI package
 beside it, in the user's cache. They are for drawing only.
 """
 
-from importlib.metadata import PackageNotFoundError, distribution
+from importlib.metadata import Distribution, PackageNotFoundError, distribution
 from pathlib import Path
 
 import numpy as np
@@ -53,16 +53,7 @@ def convert_meshes() -> Path:
     Raises:
         InputError: if the package ``example-robot-data`` is not installed.
     """
-    try:
-        vendor = distribution("example-robot-data")
-    except PackageNotFoundError:
-        raise InputError(
-            "The robots' meshes come from the package example-robot-data, "
-            "which is not installed."
-        ) from None
-    robots = Path(
-        str(vendor.locate_file("cmeel.prefix/share/example-robot-data/robots"))
-    )
+    vendor, robots = _vendor(), vendor_folder() / "robots"
     folder = cache_dir() / "meshes"
     stamp = _PACKAGE_XML.format(version=f"{_VERSION}.{vendor.version}")
     package_xml = folder / "package.xml"
@@ -74,6 +65,25 @@ def convert_meshes() -> Path:
     with atomic_path(package_xml) as temporary:
         temporary.write_text(stamp)
     return folder
+
+
+def vendor_folder() -> Path:
+    """Returns the folder of robots, URDFs and meshes of ``example-robot-data``.
+
+    Raises:
+        InputError: if the package is not installed.
+    """
+    return Path(str(_vendor().locate_file("cmeel.prefix/share/example-robot-data")))
+
+
+def _vendor() -> Distribution:
+    try:
+        return distribution("example-robot-data")
+    except PackageNotFoundError:
+        raise InputError(
+            "Robots' meshes and URDFs come from the package example-robot-data, "
+            "which is not installed."
+        ) from None
 
 
 def _convert(source: Path, target: Path, grain: float) -> None:

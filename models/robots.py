@@ -17,7 +17,9 @@ from pydrake.systems.framework import DiagramBuilder
 from loco_drake.errors import check_choice
 from loco_drake.keypoints import LEGS
 
+from . import kinematics
 from .meshes import AddMeshPackage
+from .quadruped import Quadruped
 
 Array = NDArray[np.float64]
 
@@ -27,21 +29,15 @@ LEG_JOINTS = ("hip", "thigh", "calf")
 _MODELS = Path(__file__).parent
 
 
-@dataclass(frozen=True, eq=False)
-class Robot:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Robot(Quadruped):
     """A quadruped with three joints a leg, all read from its Drake model.
 
-    Arrays are read-only float64. Joints, and so actuators, are in the order of
-    ``joint_names``: legs FL, FR, RL, RR; in a leg hip (abduction), thigh, calf. B is
-    the trunk frame: x forward, y left, z up.
+    Joints, and so actuators, are in a leg hip (abduction), thigh, calf. The methods are
+    the closed forms of :mod:`loco_drake.models.kinematics`.
 
     Attributes:
-        name: one of :data:`ROBOTS`.
         url: the model, ``package://...``; see :func:`ConfigureParser`.
-        joint_names: names of the 12 joints.
-        joint_lower: lower position limits in rad, shape (12,).
-        joint_upper: upper position limits in rad, shape (12,).
-        joint_speed_limits: rad/s, shape (12,).
         effort_limits: Nm at the joint, shape (12,).
         reflected_inertia: of the rotors as seen at the joint, kg m^2, shape (12,).
         joint_inertia: about each joint with the others locked, in the usual stance,
@@ -49,43 +45,55 @@ class Robot:
         kp: stiffness of the PD in the plant, Nm/rad, shape (12,).
         kd: damping of the PD in the plant, Nm s/rad, shape (12,).
         mass: of the whole robot, kg.
-        p_BHip: origins of the hip joints in m, shape (4, 3).
         abduction_offset: y in m from the hip joint's axis to the thigh joint, positive
             on the left, shape (4,).
         thigh_length: thigh joint to calf joint, m.
         calf_length: calf joint to the centre of the toe sphere, m.
-        foot_radius: of the toe sphere, m.
         trunk_size: of the trunk's collision box, centred at B, in m, shape (3,).
-        stand_joints: joints of the usual stance in rad, shape (12,).
-        stand_height: z of p_WB in m with the trunk level, the joints at
-            ``stand_joints`` and the lowest points of the toe spheres at z = 0.
     """
 
-    name: str
     url: str
-    joint_names: tuple[str, ...]
-    joint_lower: Array
-    joint_upper: Array
-    joint_speed_limits: Array
     effort_limits: Array
     reflected_inertia: Array
     joint_inertia: Array
     kp: Array
     kd: Array
     mass: float
-    p_BHip: Array
     abduction_offset: Array
     thigh_length: float
     calf_length: float
-    foot_radius: float
     trunk_size: Array
-    stand_joints: Array
-    stand_height: float
 
-    def __post_init__(self) -> None:
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
+    @property
+    def p_BV(self) -> Array:
+        """The thigh joints at zero abduction."""
+        return self.p_BHip + self.abduction_offset[:, None] * np.array([0.0, 1.0, 0.0])
+
+    @property
+    def folded_length(self) -> float:
+        """From the thigh joint, the calf at its limit."""
+        return kinematics.folded_length(self)
+
+    def AddModel(self, parser: Parser) -> ModelInstanceIndex:
+        """Adds the model, without its meshes, to the parser's plant."""
+        return AddRobotModel(parser, self.name, visual=False)
+
+    def toe_positions(self, joints: Array) -> Array:
+        """Returns p_BF in m, shape (..., 4, 3)."""
+        return kinematics.toe_positions(self, joints)
+
+    def knee_positions(self, joints: Array) -> Array:
+        """Returns the origins of the calf joints in B, m, shape (..., 4, 3)."""
+        return kinematics.knee_positions(self, joints)
+
+    def nearest_joints(self, p_BF: Array) -> Array:
+        """Returns joints of the closed form, clipped to their limits."""
+        joints = kinematics.leg_joints(self, p_BF)
+        return np.clip(joints, self.joint_lower, self.joint_upper)
+
+    def reachable_toes(self, p_BF: Array) -> Array:
+        """Returns toes that are moved down, or along the leg, where that is needed."""
+        return kinematics.reachable_toes(self, p_BF)
 
 
 # Not frozen: yaml_load_typed sets the fields one by one.
@@ -176,6 +184,7 @@ def get_robot(name: str) -> Robot:
 
     return Robot(
         name=name,
+        definition=name,
         url=url,
         joint_names=names,
         joint_lower=np.concatenate([j.position_lower_limits() for j in joints]),
@@ -197,6 +206,8 @@ def get_robot(name: str) -> Robot:
         trunk_size=_trunk_size(plant, scene_graph),
         stand_joints=stand_joints,
         stand_height=float(foot_radius - lowest),
+        trunk_frame="base",
+        foot_frames=tuple(f"{leg}_foot" for leg in LEGS),
     )
 
 

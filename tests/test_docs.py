@@ -46,5 +46,11 @@ def test_architecture_names_every_system_and_port_of_the_diagram():
     assert sorted(ports) == sorted(re.findall(r" p\d\(\[(\w+)\]\)", page))
 
 
+def test_retargeting_shows_the_robot_file_as_it_is():
+    page = (ROOT / "docs" / "retargeting.md").read_text()
+    (block,) = re.findall(r"^```yaml\n(.*?)^```$", page, re.M | re.S)
+    assert block == (ROOT / "examples" / "solo8.yaml").read_text()
+
+
 def readme():
     return (ROOT / "README.md").read_text()

@@ -13,7 +13,8 @@ from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments, select_labels
 from loco_drake.errors import InputError, check_choice
 from loco_drake.evaluation.retargeting import score_segments, summarize
-from loco_drake.models.robots import ROBOTS, get_robot
+from loco_drake.models.robot_files import is_robot_file, load_robot
+from loco_drake.models.robots import ROBOTS
 from loco_drake.retargeting.variants import Variant
 
 
@@ -26,7 +27,7 @@ class EvaluateRetargeting:
     """
 
     robot: str = "go2"
-    """The robot: go2, a1 or all."""
+    """The robot: go2, a1, all (both), or the YAML file of another one."""
     labels: tuple[str, ...] = ()
     """Such as dog-trot dog-pace. Default: all that segments.csv holds."""
     mirror: bool = False
@@ -50,18 +51,18 @@ class EvaluateRetargeting:
         Raises:
             InputError: if an option is wrong.
         """
-        check_choice("robot", self.robot, (*ROBOTS, "all"))
+        if not is_robot_file(self.robot):
+            check_choice("robot", self.robot, (*ROBOTS, "all"))
         if self.seeds < 1:
             raise InputError(f"--seeds must be 1 or more, not {self.seeds}.")
         segments = select_labels(read_segments(data_dir(self.data_dir)), self.labels)
-        names = list(ROBOTS) if self.robot == "all" else [self.robot]
+        definitions = ROBOTS if self.robot == "all" else (self.robot,)
+        models = {robot.name: robot for robot in map(load_robot, definitions)}
         variant = Variant(mirror=self.mirror, froude=self.froude)
         robots: dict[str, Any] = {}
         with Progress(console=Console(stderr=True), transient=True) as progress:
-            for name in names:
-                scores = score_segments(
-                    segments, get_robot(name), self.workers, variant
-                )
+            for name, robot in models.items():
+                scores = score_segments(segments, robot, self.workers, variant)
                 tracked = progress.track(
                     scores, total=len(segments), description=f"Retargeting to {name}"
                 )

@@ -19,7 +19,7 @@ from loco_drake.datasets.segments import (
 from loco_drake.datasets.split import TRAIN, VALIDATION, Split
 from loco_drake.errors import InputError
 from loco_drake.gaits import LABELS
-from loco_drake.models.robots import get_robot
+from loco_drake.models.robot_files import load_robot
 from loco_drake.retargeting.batch import Outcome, retarget_segments, stretches_of
 from loco_drake.retargeting.trajectories import (
     SECONDS,
@@ -48,7 +48,8 @@ class Retarget:
     gait: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Gait, such as trot; may be given several times. Default: those of the fifteen."""
     robot: str = "go2"
-    """The robot: go2 or a1."""
+    """The robot: go2, a1, or a YAML file that says what is in another one's URDF, such
+    as examples/solo8.yaml; docs/retargeting.md explains it."""
     start: int | None = None
     """First frame of FILE, from 0, at its own rate. Default: the first of use."""
     end: int | None = None
@@ -82,14 +83,14 @@ class Retarget:
         Raises:
             InputError: if an option is wrong, or FILE cannot be retargeted.
         """
-        robot = get_robot(self.robot)
+        robot = load_robot(self.robot)
         if self.trajectories < 0:
             raise InputError(
                 f"--trajectories must be 0 or more, not {self.trajectories}."
             )
         segments, split = self._segments()
         variant = Variant(mirror=self.mirror, froude=self.froude)
-        out = self.out or Path("motions") / f"{self.robot}{variant.suffix}"
+        out = self.out or Path("motions") / f"{robot.name}{variant.suffix}"
         outcomes: list[Outcome] = []
         with Progress(console=Console(stderr=True), transient=True) as progress:
             task = progress.add_task("Retargeting", total=len(segments))

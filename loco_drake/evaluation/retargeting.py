@@ -32,7 +32,8 @@ from loco_drake.datasets.segments import Segment
 from loco_drake.evaluation.gait_fidelity import GaitFidelity, gait_fidelity
 from loco_drake.gait_timing import clip_track, motion_track
 from loco_drake.gaits import LABELS
-from loco_drake.models.robots import Robot, get_robot
+from loco_drake.models.quadruped import Quadruped
+from loco_drake.models.robot_files import load_robot
 from loco_drake.motion_quality import stance_slip_speeds, toe_trajectories
 from loco_drake.parallel import map_in_workers
 from loco_drake.retargeting.batch import SegmentRetargeter
@@ -82,7 +83,7 @@ class _Scorer:
     """Retargets and scores, see :func:`score_segments`."""
 
     def __init__(self, robot: str, variant: Variant) -> None:
-        self._retarget = SegmentRetargeter(get_robot(robot), variant=variant)
+        self._retarget = SegmentRetargeter(load_robot(robot), variant=variant)
 
     def __call__(self, segment: Segment) -> ClipScore | FailedClip:
         result = self._retarget(segment)
@@ -102,7 +103,7 @@ class _Scorer:
 
 def score_segments(
     segments: Iterable[Segment],
-    robot: Robot,
+    robot: Quadruped,
     workers: int = 1,
     variant: Variant = AS_RECORDED,
 ) -> Iterator[ClipScore | FailedClip]:
@@ -117,7 +118,9 @@ def score_segments(
         variant: what to change of the recordings; the rhythm is compared with theirs
             in the motion's time.
     """
-    return map_in_workers(partial(_Scorer, robot.name, variant), segments, workers)
+    return map_in_workers(
+        partial(_Scorer, robot.definition, variant), segments, workers
+    )
 
 
 def summarize(scores: Sequence[ClipScore | FailedClip]) -> dict[str, Any]:

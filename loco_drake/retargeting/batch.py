@@ -10,7 +10,8 @@ from loco_drake.datasets.split import Split
 from loco_drake.errors import InputError
 from loco_drake.gaits import GaitLabel
 from loco_drake.keypoints import KeypointClip
-from loco_drake.models.robots import Robot, get_robot
+from loco_drake.models.quadruped import Quadruped
+from loco_drake.models.robot_files import load_robot
 from loco_drake.motion import FPS, Motion, save_motion
 from loco_drake.parallel import map_in_workers
 from loco_drake.retargeting.inverse_kinematics import LegSolver
@@ -46,7 +47,10 @@ class SegmentRetargeter:
     """
 
     def __init__(
-        self, robot: Robot, split: Split | None = None, variant: Variant = AS_RECORDED
+        self,
+        robot: Quadruped,
+        split: Split | None = None,
+        variant: Variant = AS_RECORDED,
     ) -> None:
         self.robot = robot
         self._split = split
@@ -82,7 +86,7 @@ class _Writer:
     def __init__(
         self, robot: str, out_dir: Path, split: Split | None, variant: Variant
     ) -> None:
-        self._retarget = SegmentRetargeter(get_robot(robot), split, variant)
+        self._retarget = SegmentRetargeter(load_robot(robot), split, variant)
         self._out_dir = out_dir
 
     def __call__(self, segment: Segment) -> Outcome:
@@ -97,7 +101,7 @@ class _Writer:
 
 def retarget_segments(
     segments: Iterable[Segment],
-    robot: Robot,
+    robot: Quadruped,
     out_dir: Path,
     split: Split | None = None,
     workers: int = 1,
@@ -119,7 +123,7 @@ def retarget_segments(
     Yields:
         One outcome for each segment, in their order, as soon as it is done.
     """
-    make = partial(_Writer, robot.name, Path(out_dir), split, variant)
+    make = partial(_Writer, robot.definition, Path(out_dir), split, variant)
     return map_in_workers(make, segments, workers)
 
 

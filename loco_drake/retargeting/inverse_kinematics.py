@@ -7,8 +7,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.solvers import SnoptSolver, SolverOptions
 
-from loco_drake.keypoints import LEGS
-from loco_drake.models.robots import AddRobotModel, Robot
+from loco_drake.models.quadruped import Quadruped
 
 Array = NDArray[np.float64]
 
@@ -28,22 +27,27 @@ class LegSolver:
     before as the speed limits ask.
     """
 
-    def __init__(self, robot: Robot, fps: float):
+    def __init__(self, robot: Quadruped, fps: float):
         self._robot = robot
         # A hair inside the limits, since the solver may end a hair outside its bounds.
         self._step = 0.999 * robot.joint_speed_limits / fps
         self._plant = MultibodyPlant(time_step=0.0)
-        AddRobotModel(Parser(self._plant), robot.name, visual=False)
+        robot.AddModel(Parser(self._plant))
         world = self._plant.world_frame()
-        self._plant.WeldFrames(world, self._plant.GetFrameByName("base"))
+        self._plant.WeldFrames(world, self._plant.GetFrameByName(robot.trunk_frame))
         self._plant.Finalize()
-        self._feet = [self._plant.GetFrameByName(f"{leg}_foot") for leg in LEGS]
+        self._feet = [self._plant.GetFrameByName(foot) for foot in robot.foot_frames]
+        # The model may have the legs in another order.
+        self._order = [
+            self._plant.GetJointByName(joint).position_start()
+            for joint in robot.joint_names
+        ]
         self._solver = SnoptSolver()
         self._options = SolverOptions()
         self._options.SetOption(self._solver.id(), "Major feasibility tolerance", 1e-7)
 
         ik = InverseKinematics(self._plant, with_joint_limits=False)
-        self._prog, self._q = ik.prog(), ik.q()
+        self._prog, self._q = ik.prog(), ik.q()[self._order]
         anywhere = np.full(3, 10.0)
         self._toes = [
             ik.AddPositionConstraint(foot, np.zeros(3), world, -anywhere, anywhere)
@@ -52,17 +56,21 @@ class LegSolver:
         self._limits = self._prog.AddBoundingBoxConstraint(
             robot.joint_lower, robot.joint_upper, self._q
         )
-        self._near = self._prog.AddQuadraticCost(np.eye(12), np.zeros(12), self._q)
+        self._near = self._prog.AddQuadraticCost(
+            np.eye(len(self._order)), np.zeros(len(self._order)), self._q
+        )
 
     def solve(self, p_BF: Array) -> Array:
-        """Returns joints (T, 12) in rad for toes ``p_BF`` (T, 4, 3) in m.
+        """Returns joints (T, J) in rad for toes ``p_BF`` (T, 4, 3) in m.
 
         Where a toe cannot be reached within the limits of position and speed, it is
         put as near to its target as they allow.
         """
-        joints = np.empty((len(p_BF), 12))
+        joints = np.empty((len(p_BF), len(self._order)))
         previous = self._robot.stand_joints
-        step = np.full(12, np.inf)  # the first frame may be far from the stance
+        step = np.full(
+            len(self._order), np.inf
+        )  # the first frame may be far from the stance
         for k, p in enumerate(p_BF):
             lower = np.maximum(self._robot.joint_lower, previous - step)
             upper = np.minimum(self._robot.joint_upper, previous + step)
@@ -79,7 +87,7 @@ class LegSolver:
         for toe, p in zip(self._toes, p_BF, strict=True):
             toe.evaluator().set_bounds(p - TOLERANCE, p + TOLERANCE)
         self._limits.evaluator().set_bounds(lower, upper)
-        self._near.evaluator().UpdateCoefficients(np.eye(12), -previous)
+        self._near.evaluator().UpdateCoefficients(np.eye(len(previous)), -previous)
         result = self._solver.Solve(self._prog, previous, self._options)
         if not result.is_success():
             return None
@@ -91,12 +99,12 @@ class LegSolver:
     ) -> Array:
         """Minimises the toes' distances; built anew, since it is rarely needed."""
         ik = InverseKinematics(self._plant, with_joint_limits=False)
-        prog, q = ik.prog(), ik.q()
+        prog, q = ik.prog(), ik.q()[self._order]
         world = self._plant.world_frame()
         for foot, p in zip(self._feet, p_BF, strict=True):
             # In mm, which the solver's tolerances suit better.
             ik.AddPositionCost(world, p, foot, np.zeros(3), 1e6 * np.eye(3))
-        prog.AddQuadraticErrorCost(_REST * np.eye(12), previous, q)
+        prog.AddQuadraticErrorCost(_REST * np.eye(len(previous)), previous, q)
         prog.AddBoundingBoxConstraint(lower, upper, q)
         result = self._solver.Solve(prog, previous, self._options)
         solution: Array = result.GetSolution(q)

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from loco_drake import motion_quality as quality
 from loco_drake.gaits import GaitLabel
 from loco_drake.keypoints import KeypointClip
-from loco_drake.models.kinematics import leg_joints, toe_positions
-from loco_drake.models.robots import Robot
+from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion import FPS, Motion, make_motion
 from loco_drake.retargeting.config import RetargetConfig, load_config
 from loco_drake.retargeting.contacts import detect_contacts, resample_contacts
@@ -23,7 +22,7 @@ from loco_drake.retargeting.scaling import (
     stance_height,
 )
 from loco_drake.retargeting.smoothing import smooth
-from loco_drake.retargeting.trunk import folded_length, raise_trunk
+from loco_drake.retargeting.trunk import raise_trunk
 from loco_drake.retargeting.variants import (
     AS_RECORDED,
     Variant,
@@ -68,7 +67,7 @@ class RetargetReport:
 
 def retarget_clip(
     clip: KeypointClip,
-    robot: Robot,
+    robot: Quadruped,
     *,
     config: RetargetConfig | None = None,
     solver: LegSolver | None = None,
@@ -134,7 +133,7 @@ def retarget_clip(
 def correct(
     formula: Targets,
     contacts: NDArray[np.bool_],
-    robot: Robot,
+    robot: Quadruped,
     config: RetargetConfig,
 ) -> Targets:
     """Returns targets at 50 Hz that a robot can follow, near to the formula's.
@@ -153,23 +152,13 @@ def correct(
     return within_reach(raise_trunk(targets, robot, FPS), robot)
 
 
-def within_reach(targets: Targets, robot: Robot) -> Targets:
+def within_reach(targets: Targets, robot: Quadruped) -> Targets:
     """Returns ``targets`` with toes that the joints' limits do not allow moved nearer.
 
-    A toe nearer to its hip than the leg folds is moved down the trunk's z axis. A leg
-    that is too short points at its target, which comes to lie at its end.
+    How is the robot's own affair, see :mod:`loco_drake.models.quadruped`.
     """
     p_BF = targets.p_BF
-    x, y, z = np.moveaxis(p_BF - robot.p_BHip, -1, 0)
-    # In the plane of the leg, whose distance from the hip's axis is the offset.
-    square = 1.001 * folded_length(robot) ** 2 + robot.abduction_offset**2
-    drop = np.sqrt(np.maximum(square - x**2 - y**2, 0.0))
-    lowered = p_BF.copy()
-    lowered[..., 2] = np.minimum(p_BF[..., 2], robot.p_BHip[:, 2] - drop)
-    folds = x**2 + y**2 + z**2 < square
-    goal = np.where(folds[..., None], lowered, p_BF)
-    joints = np.clip(leg_joints(robot, goal), robot.joint_lower, robot.joint_upper)
-    reachable = toe_positions(robot, joints)
+    reachable = robot.reachable_toes(p_BF)
     beyond = np.linalg.norm(reachable - p_BF, axis=-1, keepdims=True) > 1e-9
     p_WF = targets.p_WB[:, None] + quat_rotate(targets.q_WB[:, None], reachable)
     return replace(targets, p_WF=np.where(beyond, p_WF, targets.p_WF))

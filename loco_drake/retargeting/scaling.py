@@ -11,14 +11,14 @@ Ry(theta):
     p_WB     = alpha (w + h) / 2 + (0, 0, base_height_offset)   roll is 0
     p_WA     = w + front_hip H d +- hip_spread H s              the animal's virtual
                h + rear_hip H d +- hip_spread H s               hips, front and rear
-    p_WV     = p_WB + R (p_BHip + (0, abduction offset, 0))
+    p_WV     = p_WB + R p_BV                                    the robot's
     p_WF_xy  = (p_WV + alpha |p_WT - p_WA| u)_xy                T the animal's toe
     p_WF_z   = foot_radius + swing_height alpha max(T_z, 0)     the toe's height is kept
 
 where d is the unit vector from hip to withers, s the horizontal one to its left and u
-the one from A to T. The robot's virtual hip V is its thigh joint at zero abduction, so
-that an animal whose toes fall under its virtual hips stands with the robot's legs
-straight down.
+the one from A to T. The robot's virtual hip V is its thigh joint at zero abduction (or
+above the toe of its stance, where the legs have other joints), so that an animal whose
+toes fall under its virtual hips stands with the robot's legs straight down.
 """
 
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ from scipy.interpolate import CubicSpline
 
 from loco_drake.errors import InputError
 from loco_drake.keypoints import KeypointClip
-from loco_drake.models.robots import Robot
+from loco_drake.models.quadruped import Quadruped
 from loco_drake.retargeting.config import RetargetConfig
 from loco_drake.rotations import quat_conjugate, quat_multiply, quat_rotate, yaw_quat
 
@@ -104,7 +104,7 @@ def resample(clip: KeypointClip, fps: float) -> KeypointClip:
 
 
 def scale_to_robot(
-    clip: KeypointClip, height: float, robot: Robot, config: RetargetConfig
+    clip: KeypointClip, height: float, robot: Quadruped, config: RetargetConfig
 ) -> Targets:
     """Returns the targets by the formula above, one frame for each of the clip's.
 
@@ -126,10 +126,9 @@ def scale_to_robot(
     front = clip.withers + config.front_hip * d
     rear = clip.hip + config.rear_hip * d
     s = np.stack((-np.sin(yaw), np.cos(yaw), np.zeros_like(yaw)), axis=-1)
-    spread = config.hip_spread * height * np.sign(robot.abduction_offset)
+    spread = config.hip_spread * height * np.sign(robot.p_BV[:, 1])
     p_WA = np.stack((front, front, rear, rear), axis=1) + spread[:, None] * s[:, None]
-    p_BV = robot.p_BHip + robot.abduction_offset[:, None] * np.array([0.0, 1.0, 0.0])
-    p_WV = p_WB[:, None] + quat_rotate(base.q_WB[:, None], p_BV)
+    p_WV = p_WB[:, None] + quat_rotate(base.q_WB[:, None], robot.p_BV)
 
     p_WF = p_WV + alpha * (clip.toes - p_WA)
     lift = config.swing_height * alpha * np.maximum(clip.toes[..., 2], 0.0)

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from loco_drake.models.kinematics import leg_joints
-from loco_drake.models.robots import Robot
+from loco_drake.models.quadruped import Quadruped
 from loco_drake.retargeting.scaling import Targets
 from loco_drake.rotations import quat_rotate
 
@@ -28,21 +27,14 @@ _MAX_ROUNDS = 6
 _CLOSE_ENOUGH = 0.002
 
 
-def folded_length(robot: Robot) -> float:
-    """Returns how near in m a toe can be to its thigh joint, the calf at its limit."""
-    l1, l2 = robot.thigh_length, robot.calf_length
-    square = l1**2 + l2**2 + 2 * l1 * l2 * np.cos(robot.joint_lower[2])
-    return float(np.sqrt(square))
-
-
-def raise_trunk(targets: Targets, robot: Robot, fps: float) -> Targets:
+def raise_trunk(targets: Targets, robot: Quadruped, fps: float) -> Targets:
     """Returns ``targets`` with the trunk raised where the legs ask for it.
 
     That is where a hip is so low that a leg under it could not fold enough, or a knee
     is lower than :data:`KNEE_CLEARANCE`. Heading, pitch and toes are kept; the trunk
     rises and sinks gently.
     """
-    lowest_hip = robot.foot_radius + FOLD_MARGIN * folded_length(robot)
+    lowest_hip = robot.foot_radius + FOLD_MARGIN * robot.folded_length
     ramp = round(RAMP_SECONDS * fps)
     for _ in range(_MAX_ROUNDS):
         hips, knees = _hip_and_knee_heights(targets, robot)
@@ -55,21 +47,9 @@ def raise_trunk(targets: Targets, robot: Robot, fps: float) -> Targets:
     return targets
 
 
-def _hip_and_knee_heights(targets: Targets, robot: Robot) -> tuple[Array, Array]:
+def _hip_and_knee_heights(targets: Targets, robot: Quadruped) -> tuple[Array, Array]:
     """Returns the heights in m of the lowest hip and the lowest knee, each (T,)."""
-    joints = np.clip(
-        leg_joints(robot, targets.p_BF), robot.joint_lower, robot.joint_upper
-    )
-    a, b = joints[:, 0::3], joints[:, 1::3]
-    d, down = robot.abduction_offset, -robot.thigh_length * np.cos(b)
-    p_BKnee = robot.p_BHip + np.stack(
-        (
-            -robot.thigh_length * np.sin(b),
-            np.cos(a) * d - np.sin(a) * down,
-            np.sin(a) * d + np.cos(a) * down,
-        ),
-        axis=-1,
-    )
+    p_BKnee = robot.knee_positions(robot.nearest_joints(targets.p_BF))
     q_WB, height = targets.q_WB[:, None], targets.p_WB[:, 2]
     p_BHip = np.broadcast_to(robot.p_BHip, p_BKnee.shape)
     hips, knees = (

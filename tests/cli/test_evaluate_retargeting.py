@@ -5,6 +5,7 @@ import tyro
 
 from loco_drake.cli.evaluate_retargeting import EvaluateRetargeting
 from loco_drake.errors import InputError
+from tests.robot_files import SOLO8
 
 KEYS = {
     "stance_slip_median_mps",
@@ -64,6 +65,16 @@ def test_rhythm_of_a_mirrored_motion_in_its_own_time_is_compared_with_its_clip(
     figures = result["robots"]["go2"]["labels"]["dog-gallop"]
     assert figures["stride_period_error"] < 0.01
     assert figures["phase_lag_error"] < 0.02
+
+
+def test_robot_that_is_only_a_file(made_data, tmp_path):
+    options = ("--data-dir", made_data, "--labels", "dog-trot", "--robot", SOLO8)
+    assert command(*options, "--json", tmp_path / "a.json").run() == 0
+    robots = json.loads((tmp_path / "a.json").read_text())["robots"]
+    figures = robots["solo8"]["labels"]["dog-trot"]
+    assert figures["joint_limit_violations"] == 0
+    assert figures["stance_slip_median_mps"] < 0.03
+    assert figures["stride_period_error"] < 0.01
 
 
 def test_wrong_input_raises_one_sentence(made_data, tmp_path):

@@ -3,10 +3,13 @@ import json
 import pytest
 import tyro
 
+from loco_drake.cli.main import main
 from loco_drake.cli.retarget import Retarget
 from loco_drake.errors import InputError
+from loco_drake.models.robot_files import load_robot
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import load_motion
+from tests.robot_files import SOLO8
 from tests.synthetic_horse import make_horse, write_world_recording
 from tests.synthetic_robots import write_mpc_recording, write_solo8_recording
 
@@ -104,6 +107,50 @@ def test_help_explains_the_options(capsys):
     assert "Exchanges left and right" in page
     assert "--froude" in page
     assert "Scales time for the animal's Froude number" in page
+
+
+def test_robot_that_is_only_a_file(made_data, tmp_path, monkeypatch, capsys):
+    """By its path, in two processes, to a folder of its name; cut like any other."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_solo8.yaml").write_text(SOLO8.read_text())
+    options = ("--data-dir", made_data, "--source", "dog", "--gait", "trot")
+    robot = ("--robot", "my_solo8.yaml", "--workers", 2, "--json", "a.json")
+    assert command(*options, *robot).run() == 0
+    name = "dog-trot-made_trot-0-240"
+    motion = load_motion(tmp_path / "motions" / "my_solo8" / f"{name}.npz")
+    assert (motion.robot, motion.joint_positions.shape) == ("my_solo8", (200, 8))
+    assert motion.joint_names == load_robot("my_solo8.yaml").joint_names
+    figures = json.loads((tmp_path / "a.json").read_text())[name]
+    assert figures["stance_slip_median_mps"] < 0.03
+    cuts = [*(tmp_path / "motions" / "my_solo8-trajectories").iterdir()]
+    assert [load_motion(cut).joint_positions.shape for cut in cuts] == [(100, 8)] * 2
+    file = made_data / "dog_mann" / "keypoints" / "made_trot.txt"
+    assert command(file, *options[2:], "--robot", SOLO8, "--out", "one").run() == 0
+    assert load_motion(tmp_path / "one" / f"{name}.npz").robot == "solo8"
+
+
+def test_robots_that_can_only_be_retargeted_to_are_refused_elsewhere(
+    made_data, tmp_path, capsys
+):
+    """One sentence that names go2 and a1, for the file and for motion made with it."""
+    file = made_data / "dog_mann" / "keypoints" / "made_trot.txt"
+    one = ("--source", "dog", "--gait", "trot", "--robot", SOLO8, "--out", tmp_path)
+    assert command(file, *one).run() == 0
+    motion = tmp_path / "dog-trot-made_trot-0-240.npz"
+    commands = [
+        ("simulate", "--robot", SOLO8, "--no-meshcat"),
+        ("simulate", "--robot", "go2", "--reference", motion, "--no-meshcat"),
+        ("generate", "--robot", SOLO8),
+        ("train", "tokenizer", "--motions", tmp_path, "--out", tmp_path / "t"),
+        ("train", "tracker", "--robot", SOLO8, "--references", tmp_path),
+        ("evaluate", "tracking", "--robot", SOLO8),
+    ]
+    capsys.readouterr()
+    for arguments in commands:
+        assert main([str(argument) for argument in arguments]) == 2, arguments
+        message = capsys.readouterr().err
+        assert message.count("\n") == 1
+        assert "go2" in message, message
 
 
 def test_bad_clip_in_a_batch_is_reported_with_status_1(made_data, tmp_path, capsys):

@@ -8,7 +8,6 @@ from loco_drake.retargeting.scaling import Targets
 from loco_drake.retargeting.trunk import (
     FOLD_MARGIN,
     KNEE_CLEARANCE,
-    folded_length,
     raise_trunk,
 )
 
@@ -36,7 +35,7 @@ def knee_heights(robot, targets):
 def test_folded_leg_is_as_long_as_the_law_of_cosines_has_it(robot):
     """Go2: calf at -2.7227 rad, twice .213 m: 2 * .213 * cos(2.7227 / 2)."""
     length = 2 * robot.thigh_length * np.cos(robot.joint_lower[2] / 2)
-    assert folded_length(robot) == pytest.approx(length)
+    assert robot.folded_length == pytest.approx(length)
 
 
 def test_usual_stance_is_left_alone(robot):
@@ -46,7 +45,7 @@ def test_usual_stance_is_left_alone(robot):
 
 def test_trunk_that_crouches_too_low_is_raised_to_where_legs_fold(robot):
     raised = raise_trunk(standing(robot, 0.08, ahead=-0.05), robot, FPS)
-    lowest = robot.foot_radius + FOLD_MARGIN * folded_length(robot)
+    lowest = robot.foot_radius + FOLD_MARGIN * robot.folded_length
     assert (raised.p_WB[:, 2] >= lowest - 0.002).all()
     assert raised.p_WB[:, 2].max() < lowest + 0.03
 
@@ -85,7 +84,7 @@ def test_toe_too_near_to_its_hip_is_moved_down_and_the_path_has_no_jump(robot):
     p_VF = (reached.p_BF - robot.p_BHip)[:, 2]
     p_VF[:, 1] -= robot.abduction_offset[2]
     lengths = np.linalg.norm(p_VF, axis=-1)
-    assert lengths.min() > folded_length(robot) - 1e-6
+    assert lengths.min() > robot.folded_length - 1e-6
     np.testing.assert_allclose(p_VF[:, 0], along, atol=1e-6)
     steps = np.linalg.norm(np.diff(reached.p_WF[:, 2], axis=0), axis=-1)
     assert steps.max() < 0.05

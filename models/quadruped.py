@@ -1,0 +1,84 @@
+"""What retargeting and the figures of motion ask of a robot, whatever its legs."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.tree import ModelInstanceIndex
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Quadruped(ABC):
+    """A robot with four legs of n joints each, J = 4 n in all.
+
+    Arrays are read-only float64. Joints are in the order of ``joint_names``: legs FL,
+    FR, RL, RR, in a leg from the trunk to the toe. B is the trunk frame: x forward, y
+    left, z up. Methods take and return arrays with any leading shape.
+
+    Attributes:
+        name: as in the header of a Motion file.
+        definition: what :func:`loco_drake.models.robot_files.load_robot` makes it from.
+        joint_names: names of the J joints.
+        joint_lower: lower position limits in rad, shape (J,).
+        joint_upper: upper position limits in rad, shape (J,).
+        joint_speed_limits: rad/s, shape (J,).
+        p_BHip: origins of the legs' first joints in m, shape (4, 3).
+        foot_radius: of the toe sphere, m.
+        stand_joints: joints of the usual stance in rad, shape (J,).
+        stand_height: z of p_WB in m with the trunk level, the joints at
+            ``stand_joints`` and the lowest points of the toe spheres at z = 0.
+        trunk_frame: name of B in the model.
+        foot_frames: names of the frames at the centres of the toe spheres.
+    """
+
+    name: str
+    definition: str
+    joint_names: tuple[str, ...]
+    joint_lower: Array
+    joint_upper: Array
+    joint_speed_limits: Array
+    p_BHip: Array
+    foot_radius: float
+    stand_joints: Array
+    stand_height: float
+    trunk_frame: str
+    foot_frames: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    @property
+    @abstractmethod
+    def p_BV(self) -> Array:
+        """Virtual hips in m, shape (4, 3): a toe right below one is where it stands."""
+
+    @property
+    @abstractmethod
+    def folded_length(self) -> float:
+        """How near in m a toe can be to the joint that swings its leg fore and aft."""
+
+    @abstractmethod
+    def AddModel(self, parser: Parser) -> ModelInstanceIndex:
+        """Adds the model, without pictures, to the parser's plant."""
+
+    @abstractmethod
+    def toe_positions(self, joints: Array) -> Array:
+        """Returns p_BF in m, the centres of the toe spheres, (..., 4, 3)."""
+
+    @abstractmethod
+    def knee_positions(self, joints: Array) -> Array:
+        """Returns the origins of the legs' last joints in B, m, (..., 4, 3)."""
+
+    @abstractmethod
+    def nearest_joints(self, p_BF: Array) -> Array:
+        """Returns joints (..., J) within the limits that put the toes near ``p_BF``."""
+
+    @abstractmethod
+    def reachable_toes(self, p_BF: Array) -> Array:
+        """Returns where the toes can be, within the limits, near ``p_BF``."""
