@@ -115,7 +115,7 @@ def _rows(summary: ClipSummary) -> list[list[str]]:
         "stride_period_s": "stride period, s",
     }
     rows += [[name, text(getattr(summary, key))] for key, name in names.items()]
-    for key, name in (("duty_factor", "duty factor"), ("phase", "touchdown after RL")):
-        values = "  ".join(text(value) for value in getattr(summary, key))
+    for key, name in (("duty_factor", "duty factor"), ("phase", "lag behind RL")):
+        values = "  ".join(text(value) for value in getattr(summary, key) or (None,))
         rows.append([f"{name}: FL FR RL RR", values])
     return rows

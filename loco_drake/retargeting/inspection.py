@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from loco_drake.gait_timing import clip_track, gait_timing
 from loco_drake.keypoints import LEGS, KeypointClip
 from loco_drake.retargeting.config import load_config
 from loco_drake.retargeting.contacts import detect_contacts, intervals
@@ -16,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ClipSummary:
-    """What a clip shows.
+    """What a clip shows; rhythm as defined in :mod:`loco_drake.gait_timing`.
 
     Attributes:
         frames: of the clip.
@@ -24,11 +25,9 @@ class ClipSummary:
         seconds: from the first frame to the last.
         stance_height_m: of the middle between withers and hip.
         speed_mean_mps: of that point over the ground.
-        stride_period_s: mean time between touchdowns of one foot, None if no foot
-            lands twice.
-        duty_factor: share of the time that each foot is down, FL, FR, RL, RR.
-        phase: touchdown of each foot after RL's as a share of the stride, None where it
-            is not known.
+        stride_period_s: None, as all that follows, if there are not three strides.
+        duty_factor: share of the stride that each foot is down, FL, FR, RL, RR.
+        phase: lag of each foot behind RL as a share of the stride.
     """
 
     frames: int
@@ -37,8 +36,8 @@ class ClipSummary:
     stance_height_m: float
     speed_mean_mps: float
     stride_period_s: float | None
-    duty_factor: tuple[float, ...]
-    phase: tuple[float | None, ...]
+    duty_factor: tuple[float, ...] | None
+    phase: tuple[float, ...] | None
 
 
 def summarize(clip: KeypointClip) -> tuple[ClipSummary, NDArray[np.bool_]]:
@@ -50,18 +49,16 @@ def summarize(clip: KeypointClip) -> tuple[ClipSummary, NDArray[np.bool_]]:
     config = load_config(clip.source)
     height = stance_height(clip, config.stance_height_percentile)
     contacts = detect_contacts(clip, height, config.contact)
-    landings = [_landings(contacts[:, leg]) / clip.fps for leg in range(len(LEGS))]
-    strides = np.concatenate([np.diff(times) for times in landings])
-    period = float(strides.mean()) if len(strides) else None
+    timing = gait_timing(clip_track(clip))
     summary = ClipSummary(
         frames=len(clip),
         fps=clip.fps,
         seconds=(len(clip) - 1) / clip.fps,
         stance_height_m=height,
         speed_mean_mps=float(trunk_speed(clip).mean()),
-        stride_period_s=period,
-        duty_factor=tuple(float(share) for share in contacts.mean(axis=0)),
-        phase=tuple(_phase(times, landings[2], period) for times in landings),
+        stride_period_s=timing.stride_period if timing else None,
+        duty_factor=tuple(timing.duty_factors.tolist()) if timing else None,
+        phase=tuple(timing.phase_lags.tolist()) if timing else None,
     )
     return summary, contacts
 
@@ -99,19 +96,3 @@ def clip_figure(clip: KeypointClip, contacts: NDArray[np.bool_], title: str) -> 
     speed.set(ylabel="speed [m/s]", xlabel="time [s]")
     speed.legend(loc="upper right")
     return figure
-
-
-def _landings(contact: NDArray[np.bool_]) -> Array:
-    """Returns the frames at which a toe lands; a clip that starts in contact: no."""
-    return np.array(
-        [start for start, _ in intervals(contact) if start > 0], dtype=float
-    )
-
-
-def _phase(times: Array, reference: Array, period: float | None) -> float | None:
-    """Returns the circular mean of the touchdowns' lag behind the reference's."""
-    if period is None or not len(times) or not len(reference):
-        return None
-    before = reference[np.abs(times[:, None] - reference).argmin(axis=1)]
-    lag = np.exp(2j * np.pi * (times - before) / period).mean()
-    return float(np.angle(lag) / (2 * np.pi) % 1.0)

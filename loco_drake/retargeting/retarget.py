@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake import motion_quality as quality
 from loco_drake.gaits import GaitLabel
 from loco_drake.keypoints import KeypointClip
 from loco_drake.models.kinematics import leg_joints, toe_positions
 from loco_drake.models.robots import Robot
 from loco_drake.motion import FPS, Motion, make_motion
-from loco_drake.retargeting import quality
 from loco_drake.retargeting.config import RetargetConfig, load_config
 from loco_drake.retargeting.contacts import detect_contacts, resample_contacts
 from loco_drake.retargeting.feet import plant_feet
@@ -28,7 +28,7 @@ from loco_drake.rotations import quat_rotate
 
 @dataclass(frozen=True)
 class RetargetReport:
-    """How well one clip was retargeted; definitions in :mod:`.quality`.
+    """How well one clip was retargeted, see :mod:`loco_drake.motion_quality`.
 
     Attributes:
         frames: of the motion.

@@ -15,7 +15,7 @@ from loco_drake.generation.pretrained import (
 )
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import load_motion
-from loco_drake.retargeting.quality import (
+from loco_drake.motion_quality import (
     penetration_max,
     stance_slip_median,
     toe_trajectories,

@@ -15,12 +15,13 @@ def test_summary_finds_the_gait_that_the_dog_was_made_with(tmp_path, gait):
     assert summary.frames == len(contacts) == 300
     assert summary.stance_height_m == pytest.approx(STANCE_HEIGHT, abs=1e-4)
     assert summary.speed_mean_mps == pytest.approx(made.speed, rel=1e-3)
-    assert summary.stride_period_s == pytest.approx(made.period, rel=0.02)
+    assert summary.stride_period_s == pytest.approx(made.period, rel=0.002)
     lag = np.array(summary.phase) - made.phase
-    assert np.abs((lag + 0.5) % 1 - 0.5).max() < 0.03
+    assert np.abs((lag + 0.5) % 1 - 0.5).max() < 0.005
+    # Toes take off and land softly: they are low and slow a while longer.
     excess = np.array(summary.duty_factor) - made.duty
-    assert (excess > -0.03).all()
-    assert (excess < 6 / 60 / made.period).all()
+    assert (excess > -0.01).all()
+    assert (excess < 0.2).all()
 
 
 def test_standing_dog_has_no_stride(tmp_path):
@@ -28,7 +29,7 @@ def test_standing_dog_has_no_stride(tmp_path):
     clip = read_dog(tmp_path / "dog.txt", gait="pace", end=6)
     summary, _ = summarize(clip)
     assert summary.stride_period_s is None
-    assert summary.phase == (None,) * 4
+    assert summary.duty_factor is summary.phase is None
 
 
 def test_figure_shows_each_contact_as_a_bar(tmp_path):

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
+from loco_drake import motion_quality as quality
 from loco_drake.datasets.dog import read_dog
 from loco_drake.datasets.segments import read_segments, select_segments
 from loco_drake.errors import InputError
 from loco_drake.keypoints import KeypointClip
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import FPS
-from loco_drake.retargeting import quality
 from loco_drake.retargeting.config import load_config
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import retarget_clip, within_reach

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from loco_drake import motion_quality as quality
 from loco_drake.gaits import GaitLabel
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import make_motion
-from loco_drake.retargeting import quality
 
 RADIUS = 0.022
 

@@ -1,4 +1,4 @@
-"""How good a retargeted motion is, from its geometry alone.
+"""How good a motion is, from its geometry alone: one definition for each number.
 
 Every figure is computed from joint angles and trunk poses by the robot's kinematics,
 never from contact labels, so that it means the same for a motion from anywhere.

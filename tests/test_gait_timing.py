@@ -1,0 +1,113 @@
+import numpy as np
+import pytest
+
+from loco_drake.gait_timing import (
+    Track,
+    clip_track,
+    duty_factors,
+    gait_timing,
+    motion_track,
+    phase_lags,
+    stride_period,
+)
+from loco_drake.keypoints import KeypointClip
+from loco_drake.models.robots import get_robot
+from tests.synthetic import GAITS, make_dog
+from tests.synthetic_motion import PHASES, synthetic_motion
+
+FPS = 50.0
+LAGS = np.array([0.37, 0.9, 0.0, 0.55])
+
+
+def swinging(period, seconds=4.0, heading=0.0, overtone=0.0, speed=0.7):
+    """Toes that swing as cosines of 8 cm (and an overtone) under a moving trunk."""
+    time = np.arange(round(seconds * FPS)) / FPS
+    ahead = np.array([np.cos(heading), np.sin(heading)])
+    trunk = speed * time[:, None] * ahead
+    cycle = 2 * np.pi * (time[:, None] / period - LAGS)
+    fore_aft = 0.08 * np.cos(cycle) + overtone * np.cos(2 * cycle + 1.0)
+    soles = np.zeros((len(time), 4, 3))
+    soles[..., :2] = trunk[:, None] + fore_aft[..., None] * ahead
+    return Track(FPS, trunk, np.full(len(time), heading), soles, 0.3)
+
+
+@pytest.mark.parametrize("period", [0.4, 0.473, 0.512, 0.777])
+def test_period_and_lags_of_cosines_between_frames(period):
+    """The period is told to a fiftieth of a frame, whatever the heading."""
+    track = swinging(period, heading=2.1, overtone=0.03)
+    assert stride_period(track) == pytest.approx(period, abs=0.0004)
+    lag = phase_lags(track, period) - LAGS
+    assert np.abs((lag + 0.5) % 1 - 0.5).max() < 1e-9
+
+
+def test_a_clip_of_less_than_three_strides_has_no_timing():
+    assert gait_timing(swinging(0.9, seconds=2.8)) is not None
+    assert gait_timing(swinging(0.9, seconds=2.5)) is None
+    assert gait_timing(swinging(0.9, seconds=0.1)) is None
+
+
+def test_without_a_rhythm_there_is_no_period():
+    still = swinging(0.5, speed=0.0)
+    still.soles[:] = still.soles[0]
+    assert stride_period(still) is None
+    noise = swinging(0.5)
+    noise.soles[:] = np.random.default_rng(0).normal(size=noise.soles.shape)
+    assert stride_period(noise) is None
+
+
+def test_duty_factor_by_hand():
+    """Ten strides of .4 s, 20 frames; the trunk moves at 1 m/s, stance height .3 m.
+
+    FL stands 12 frames a stride and then swings; FR never leaves the ground but skates
+    along with the trunk; RL stands still at 2 cm, which is too high; RR stands
+    at 1.5 cm, which is not.
+    """
+    frames = 200
+    stance = np.arange(frames) % 20 < 12
+    x = np.cumsum(np.where(stance, 0.0, 1 / FPS / 0.4))
+    soles = np.zeros((frames, 4, 3))
+    soles[:, 0, 0] = x
+    soles[:, 1, 0] = np.arange(frames) / FPS
+    soles[:, 2, 2], soles[:, 3, 2] = 0.02, 0.015
+    trunk = np.stack((np.arange(frames) / FPS, np.zeros(frames)), axis=-1)
+    track = Track(FPS, trunk, np.zeros(frames), soles, 0.3)
+    # Central differences see a toe move one frame before it does: 11 frames of 20.
+    np.testing.assert_allclose(duty_factors(track, 0.4), [11 / 20, 0, 0, 1], atol=0.01)
+
+
+@pytest.mark.parametrize("gait", GAITS)
+def test_timing_of_a_made_dog(gait):
+    """What it was made with; soft landings make the duty factor higher."""
+    dog = make_dog(gait)
+    clip = KeypointClip("dog", gait, 60.0, dog.withers, dog.hip, dog.toes, {})
+    timing = gait_timing(clip_track(clip))
+    assert timing.stride_period == pytest.approx(dog.gait.period, abs=0.001)
+    lag = timing.phase_lags - dog.gait.phase
+    assert np.abs((lag + 0.5) % 1 - 0.5).max() < 0.005
+    excess = timing.duty_factors - dog.gait.duty
+    assert (excess > -0.01).all()
+    assert (excess < 0.2).all()
+
+
+def test_timing_is_the_same_in_another_unit_of_length_and_place():
+    dog = make_dog("trot")
+    timings = []
+    for scale in (1.0, 3.7):
+        points = (scale * dog.withers, scale * dog.hip, scale * dog.toes)
+        timings.append(
+            gait_timing(clip_track(KeypointClip("dog", "trot", 60.0, *points, {})))
+        )
+    assert timings[0].stride_period == pytest.approx(timings[1].stride_period)
+    lag = timings[0].phase_lags - timings[1].phase_lags
+    assert np.abs((lag + 0.5) % 1 - 0.5).max() < 1e-9
+    np.testing.assert_allclose(timings[0].duty_factors, timings[1].duty_factors)
+
+
+@pytest.mark.parametrize("gait", ["trot", "pace"])
+def test_timing_of_a_robot_that_turns(gait):
+    motion = synthetic_motion(f"dog-{gait}", turn=0.6, period=0.45)
+    timing = gait_timing(motion_track(motion, get_robot("go2")))
+    assert timing.stride_period == pytest.approx(0.45, abs=0.002)
+    lag = timing.phase_lags - PHASES[gait]
+    assert np.abs((lag + 0.5) % 1 - 0.5).max() < 0.01
+    np.testing.assert_allclose(timing.duty_factors, 0.5, atol=0.05)
