@@ -13,10 +13,10 @@ Phase lag
     difference of the phases of the fundamentals of their x(t), which are fitted by
     least squares together with two harmonics and a straight line.
 Duty factor
-    The share of whole strides in which a toe is down: its sole lower than 6 % of the
-    stance height and, over the ground, slower than half of the trunk's mean speed (or
-    half a stance height per second, where that is more). So a toe that hovers or
-    skates along with the trunk is never down.
+    The share of whole strides in which a toe is down: from one frame to the next its
+    sole is lower than 6 % of the stance height in both and moves, over the ground, at
+    less than half of the trunk's mean speed (or half a stance height per second, where
+    that is more). So a toe that hovers or skates along with the trunk is never down.
 """
 
 from dataclasses import dataclass
@@ -54,7 +54,7 @@ class Track:
         trunk: horizontal position of the trunk's middle in m, shape (T, 2).
         yaw: heading of the trunk in rad, shape (T,).
         soles: lowest points of the toes in m, ground at z = 0, shape (T, 4, 3).
-        stance_height: of the trunk over the ground in m, the unit of length.
+        stance_height: of the animal or robot in m, the unit of length.
     """
 
     fps: float
@@ -87,8 +87,13 @@ class GaitTiming:
     duty_factors: Array
 
 
-def clip_track(clip: KeypointClip) -> Track:
-    """Returns the track of an animal: its trunk lies between withers and hip."""
+def clip_track(clip: KeypointClip, stance_height: float) -> Track:
+    """Returns the track of an animal: its trunk lies between withers and hip.
+
+    Args:
+        clip: ground at z = 0.
+        stance_height: what is scaled to the robot's, m.
+    """
     spine = clip.withers - clip.hip
     middle = (clip.withers + clip.hip) / 2
     return Track(
@@ -96,7 +101,7 @@ def clip_track(clip: KeypointClip) -> Track:
         trunk=middle[:, :2],
         yaw=np.arctan2(spine[:, 1], spine[:, 0]),
         soles=clip.toes,
-        stance_height=float(np.median(middle[:, 2])),
+        stance_height=stance_height,
     )
 
 
@@ -123,7 +128,7 @@ def gait_timing(track: Track) -> GaitTiming | None:
 def stride_period(track: Track) -> float | None:
     """Returns the stride period in s, None without three strides of one rhythm."""
     signals = track.fore_aft
-    lags = len(signals) // MIN_STRIDES
+    lags = (len(signals) - 1) // MIN_STRIDES
     correlation = np.array([_correlation(signals, lag) for lag in range(lags + 2)])
     inner = correlation[1:-1]
     peaks = 1 + np.flatnonzero((inner > correlation[:-2]) & (inner >= correlation[2:]))
@@ -150,18 +155,23 @@ def phase_lags(track: Track, period: float) -> Array:
 
 def duty_factors(track: Track, period: float) -> Array:
     """Returns the share of whole strides in which each toe is down, shape (4,)."""
-    velocity = np.gradient(track.soles[..., :2], 1 / track.fps, axis=0)
-    speed = np.hypot(velocity[..., 0], velocity[..., 1])
-    trunk_velocity = np.gradient(track.trunk, 1 / track.fps, axis=0)
-    trunk_speed = np.hypot(trunk_velocity[:, 0], trunk_velocity[:, 1]).mean()
+    speed = _speed(track.soles[..., :2], track.fps)
+    trunk_speed = float(_speed(track.trunk, track.fps).mean())
     slow = speed < max(
         _DOWN_SPEED_RATIO * trunk_speed, _DOWN_SPEED * track.stance_height
     )
     low = track.soles[..., 2] < _DOWN_HEIGHT * track.stance_height
-    strides = int(len(track.soles) / track.fps / period)
-    frames = round(strides * period * track.fps)
-    factors: Array = (low & slow)[:frames].mean(axis=0)
+    down = low[:-1] & low[1:] & slow
+    strides = int(len(down) / track.fps / period)
+    factors: Array = down[: round(strides * period * track.fps)].mean(axis=0)
     return factors
+
+
+def _speed(points: Array, fps: float) -> Array:
+    """Returns the speeds between frames, (T - 1, ...), of points (T, ..., 2)."""
+    steps = np.diff(points, axis=0) * fps
+    speed: Array = np.hypot(steps[..., 0], steps[..., 1])
+    return speed
 
 
 def _correlation(signals: Array, lag: int) -> float:

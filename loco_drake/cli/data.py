@@ -69,11 +69,13 @@ class DataInspect:
     file: tyro.conf.Positional[Path]
     """A recording."""
     source: str = "dog"
-    """Whose format it has: dog."""
-    start: int = 0
-    """First frame, from 0, at the file's own rate."""
+    """Whose format it has: dog, horse, mpc or solo8."""
+    start: int | None = None
+    """First frame, from 0, at the file's own rate. Default: the first of use."""
     end: int | None = None
     """Frame after the last. Default: the end of the file."""
+    fps: float | None = None
+    """Rate in frames/s. Default: what the format, the file's name or motion tells."""
     out: Path | None = None
     """The picture, .png. Default: the recording's name in this folder."""
     json: Path | None = None
@@ -88,7 +90,12 @@ class DataInspect:
             InputError: if the file is not of the source's format.
         """
         clip = read_clip(
-            self.source, self.file, gait="unknown", start=self.start, end=self.end
+            self.source,
+            self.file,
+            gait="unknown",
+            start=self.start,
+            end=self.end,
+            fps=self.fps,
         )
         summary, contacts = summarize(clip)
         stretch = f"{self.file.stem}-{clip.provenance['frames']}"

@@ -26,6 +26,11 @@ _COMMANDS = {
         "the GPT that writes them",
     ),
     "train tracker": ("train_tracker", "TrainTracker", "the policy, by PPO"),
+    "evaluate retargeting": (
+        "evaluate_retargeting",
+        "EvaluateRetargeting",
+        "how well recordings become motion of a robot",
+    ),
 }
 _HELP = ("-h", "--help")
 

@@ -34,3 +34,10 @@ def print_table(
         table.add_row(*row)
     # Rich takes a file or a pipe for a terminal of 80 columns.
     Console(width=None if sys.stdout.isatty() else 160).print(table)
+
+
+def print_failed(failed: Iterable[tuple[str, str]]) -> None:
+    """Says on stderr which clips failed, and why."""
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    for name, error in failed:
+        console.print(f"Failed: {name}: {error}", markup=False)

@@ -7,7 +7,7 @@ import tyro
 from rich.console import Console
 from rich.progress import Progress
 
-from loco_drake.cli.output import print_table, write_json
+from loco_drake.cli.output import print_failed, print_table, write_json
 from loco_drake.datasets.registry import data_dir, read_clip
 from loco_drake.datasets.segments import Segment, read_segments, select_segments
 from loco_drake.errors import InputError
@@ -28,15 +28,17 @@ class Retarget:
     file: tyro.conf.Positional[Path | None] = None
     """A recording; needs --source and --gait."""
     source: str | None = None
-    """Where the recordings come from: dog. Default: all."""
+    """Where the recordings come from: dog, horse, mpc or solo8. Default: all."""
     gait: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Gait, such as trot; may be given several times. Default: those of the fifteen."""
     robot: str = "go2"
     """The robot: go2 or a1."""
-    start: int = 0
-    """First frame of FILE, from 0, at its own rate."""
+    start: int | None = None
+    """First frame of FILE, from 0, at its own rate. Default: the first of use."""
     end: int | None = None
     """Frame of FILE after the last. Default: the end of the file."""
+    fps: float | None = None
+    """Rate of FILE in frames/s. Default: what its format, name or motion tells."""
     out: Path | None = None
     """Folder for the Motion files. Default: motions/ROBOT."""
     data_dir: Path | None = None
@@ -67,18 +69,14 @@ class Retarget:
         write_json(self.json, {o.segment.name: _figures(o) for o in outcomes})
         rows = [_row(outcome) for outcome in outcomes if outcome.report is not None]
         print_table(f"Motion files in {out}: {len(rows)}", list(_COLUMNS), rows)
-        console = Console(stderr=True, highlight=False, soft_wrap=True)
-        for outcome in failed:
-            console.print(
-                f"Failed: {outcome.segment.name}: {outcome.error}", markup=False
-            )
+        print_failed((o.segment.name, str(o.error)) for o in failed)
         return 1 if failed else 0
 
     def _segments(self) -> list[Segment]:
         if self.file is not None:
             return [self._segment_of_file(self.file)]
-        if self.start != 0 or self.end is not None:
-            raise InputError("--start and --end need a FILE.")
+        if (self.start, self.end, self.fps) != (None, None, None):
+            raise InputError("--start, --end and --fps need a FILE.")
         segments = read_segments(data_dir(self.data_dir))
         if self.gait:
             return select_segments(segments, self.source, self.gait)
@@ -90,9 +88,16 @@ class Retarget:
         if self.source is None or len(self.gait) != 1:
             raise InputError("A FILE needs its --source and one --gait.")
         (gait,) = self.gait
-        clip = read_clip(self.source, file, gait=gait, start=self.start, end=self.end)
-        end = self.start + len(clip)
-        return Segment(self.source, file, gait, self.start, end, clip.fps)
+        clip = read_clip(
+            self.source,
+            file,
+            gait=gait,
+            start=self.start,
+            end=self.end,
+            fps=self.fps,
+        )
+        start, end = map(int, clip.provenance["frames"].split("-"))
+        return Segment(self.source, file, gait, start, end, clip.fps)
 
 
 def _figures(outcome: Outcome) -> dict[str, object]:

@@ -9,13 +9,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.datasets.normalize import check_range, ground_toes, start_along_x
+from loco_drake.datasets.normalize import (
+    check_range,
+    check_steps,
+    ground_toes,
+    start_along_x,
+)
 from loco_drake.datasets.text import read_table
 from loco_drake.errors import InputError
 from loco_drake.keypoints import KeypointClip
 
 FPS = 60.0
 COLUMNS = 81
+FORMAT = "a dog keypoint file"
 
 # Points of the skeleton. The withers are the point at the base of the neck: it lies on
 # the spine as the hip does, whereas the shoulder points (6, 11) hang 3 cm below it,
@@ -35,7 +41,12 @@ MAX_STEP = 0.5  # m from one frame to the next
 
 
 def read_dog(
-    path: Path, *, gait: str, start: int = 0, end: int | None = None
+    path: Path,
+    *,
+    gait: str,
+    start: int | None = None,
+    end: int | None = None,
+    fps: float | None = None,
 ) -> KeypointClip:
     """Reads frames ``start`` to ``end`` (exclusive) of a dog recording.
 
@@ -45,14 +56,15 @@ def read_dog(
     Args:
         path: a keypoint text file of the MANN dog.
         gait: what the dog does in that stretch.
-        start: first frame, from 0.
+        start: first frame, from 0; None for the start of the file.
         end: frame after the last; None for the end of the file.
+        fps: frames per second; None for the format's 60.
 
     Raises:
         InputError: if the file is not of this format, or the stretch not within it.
     """
     path = Path(path)
-    table = read_table(path, COLUMNS, "a dog keypoint file")
+    table = read_table(path, COLUMNS, FORMAT)
     start, end = check_range(start, end, len(table), path.name)
     points = table.reshape(-1, COLUMNS // 3, 3)
     points = points[..., [0, 2, 1]] * (1.0, -1.0, 1.0)  # y up to z up
@@ -64,7 +76,7 @@ def read_dog(
     return KeypointClip(
         source="dog",
         gait=gait,
-        fps=FPS,
+        fps=fps or FPS,
         withers=withers,
         hip=hip,
         toes=toes,
@@ -79,14 +91,7 @@ def _check_points(points: NDArray[np.float64], path: Path) -> None:
     low, high = TRUNK_LENGTHS
     if not low <= length <= high:
         raise InputError(
-            f"{path} is not a dog keypoint file: the trunk would be {length:.3g} m "
+            f"{path} is not {FORMAT}: the trunk would be {length:.3g} m "
             f"long, not {low} to {high} m (are these metres?)."
         )
-    used = points[:, [WITHERS, HIP, *TOES]]
-    steps = np.linalg.norm(np.diff(used, axis=0), axis=-1).max(axis=-1, initial=0.0)
-    if (steps > MAX_STEP).any():
-        line = int(np.argmax(steps > MAX_STEP)) + 2
-        raise InputError(
-            f"{path} is not a dog keypoint file: at line {line} a point "
-            f"jumps by more than {MAX_STEP} m (are lines missing or out of order?)."
-        )
+    check_steps(points[:, [WITHERS, HIP, *TOES]], MAX_STEP, path, FORMAT)

@@ -1,5 +1,7 @@
 """What all readers do to bring a recording into the form of a KeypointClip."""
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,19 +10,45 @@ from loco_drake.errors import InputError
 Array = NDArray[np.float64]
 
 
-def check_range(start: int, end: int | None, frames: int, what: str) -> tuple[int, int]:
-    """Returns ``(start, end)`` of a stretch, ``end`` exclusive and None for the last.
+def check_range(
+    start: int | None, end: int | None, frames: int, what: str
+) -> tuple[int, int]:
+    """Returns ``(start, end)`` of a stretch, ``end`` exclusive.
+
+    None stands for the first frame, or for the frame after the last.
 
     Raises:
         InputError: if the stretch does not lie within ``frames`` frames.
     """
+    first = 0 if start is None else start
     stop = frames if end is None else end
-    if not 0 <= start < stop <= frames:
+    if not 0 <= first < stop <= frames:
         raise InputError(
-            f"Frames {start} to {stop} (exclusive) do not lie within {what}, "
+            f"Frames {first} to {stop} (exclusive) do not lie within {what}, "
             f"which has {frames} frames."
         )
-    return start, stop
+    return first, stop
+
+
+def check_steps(points: Array, max_step: float, path: Path, what: str) -> None:
+    """Checks that no point moves further than ``max_step`` m from frame to frame.
+
+    Args:
+        points: in m, shape (T, N, 3).
+        max_step: more than any true point does, so that lines are missing or shuffled.
+        path: the file, one frame a line, for the message.
+        what: its format, for the message: "a dog keypoint file".
+
+    Raises:
+        InputError: naming the first line after a jump.
+    """
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=-1).max(axis=-1, initial=0.0)
+    if (steps > max_step).any():
+        line = int(np.argmax(steps > max_step)) + 2
+        raise InputError(
+            f"{path} is not {what}: at line {line} a point jumps by more than "
+            f"{max_step} m (are lines missing or out of order?)."
+        )
 
 
 def ground_toes(toes: Array, percentile: float) -> Array:

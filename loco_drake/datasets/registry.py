@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Protocol
 
 from loco_drake.datasets.dog import read_dog
+from loco_drake.datasets.mpc import read_mpc
+from loco_drake.datasets.solo8 import read_solo8
 from loco_drake.errors import InputError, check_choice
 from loco_drake.files import cache_dir
 from loco_drake.keypoints import KeypointClip
@@ -17,7 +19,13 @@ class Reader(Protocol):
     """Reads frames ``start`` to ``end`` (exclusive) of one file as a clip."""
 
     def __call__(
-        self, path: Path, *, gait: str, start: int = 0, end: int | None = None
+        self,
+        path: Path,
+        *,
+        gait: str,
+        start: int | None = None,
+        end: int | None = None,
+        fps: float | None = None,
     ) -> KeypointClip:
         """Returns the clip; raises InputError for a file of another format."""
         ...
@@ -52,6 +60,20 @@ DATASETS = {
             attribution="Zhang, Starke, Komura, Saito 2018 (MANN, AI4Animation)",
             read=read_dog,
         ),
+        Dataset(
+            source="mpc",
+            folder="mpc_rfmpc",
+            licence="none stated (made with RF-MPC, MIT)",
+            attribution="LearnDiverseLoco's authors 2025, with RF-MPC by Yanran Ding",
+            read=read_mpc,
+        ),
+        Dataset(
+            source="solo8",
+            folder="solo8_cassi",
+            licence="BSD-3-Clause",
+            attribution="Li et al. 2023 (CASSI), as points by LearnDiverseLoco",
+            read=read_solo8,
+        ),
     )
 }
 
@@ -66,7 +88,13 @@ def get_dataset(source: str) -> Dataset:
 
 
 def read_clip(
-    source: str, path: Path, *, gait: str, start: int = 0, end: int | None = None
+    source: str,
+    path: Path,
+    *,
+    gait: str,
+    start: int | None = None,
+    end: int | None = None,
+    fps: float | None = None,
 ) -> KeypointClip:
     """Reads one stretch of one recording, its licence in the provenance.
 
@@ -74,15 +102,16 @@ def read_clip(
         source: whose format the file has, a key of :data:`DATASETS`.
         path: the file.
         gait: what the animal or robot does in that stretch.
-        start: first frame, from 0.
+        start: first frame, from 0; None for the first of use.
         end: frame after the last; None for the end of the file.
+        fps: frames per second; None if the format, the file or its motion tells.
 
     Raises:
         InputError: if the source is unknown, the file not of its format, or the
             stretch not within it.
     """
     dataset = get_dataset(source)
-    clip = dataset.read(path, gait=gait, start=start, end=end)
+    clip = dataset.read(path, gait=gait, start=start, end=end, fps=fps)
     origin = {"licence": dataset.licence, "attribution": dataset.attribution}
     return replace(clip, provenance={**clip.provenance, **origin})
 

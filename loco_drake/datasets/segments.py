@@ -1,15 +1,19 @@
 """Which stretch of which file holds which gait: ``segments.csv`` of the data folder."""
 
 import csv
+import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from loco_drake.datasets.registry import DATASETS, read_clip
-from loco_drake.errors import InputError
+from loco_drake.errors import InputError, check_choice
 from loco_drake.keypoints import KeypointClip
 
 COLUMNS = ("dataset", "file", "gait", "start_frame", "end_frame", "fps")
+
+# Horse<animal>_M<day of measurement>_<gait><number>...
+_HORSE = re.compile(r"(Horse\d+)_M\d+_")
 
 
 @dataclass(frozen=True)
@@ -35,18 +39,52 @@ class Segment:
     @property
     def name(self) -> str:
         """Names the segment and what is made of it: ``dog-trot-dog_walk04-232-545``."""
-        return f"{self.source}-{self.gait}-{self.path.stem}-{self.start}-{self.end}"
+        return f"{self.label}-{self.path.stem}-{self.start}-{self.end}"
+
+    @property
+    def label(self) -> str:
+        """What it holds, such as ``dog-trot``; need not be one of the fifteen."""
+        return f"{self.source}-{self.gait}"
 
     @property
     def seconds(self) -> float:
         """Length of the segment."""
         return (self.end - self.start) / self.fps
 
+    @property
+    def recording(self) -> str:
+        """Names the file, without its ending."""
+        return self.path.stem
+
+    @property
+    def animal(self) -> str | None:
+        """Names the animal where the file's name does: ``Horse3``."""
+        horse = _HORSE.match(self.path.name) if self.source == "horse" else None
+        return horse[1] if horse else None
+
+    @property
+    def subject(self) -> str:
+        """Names the animal, or else the recording, and its source."""
+        return f"{self.source}-{self.animal or self.recording}"
+
     def read(self) -> KeypointClip:
-        """Returns the frames; raises InputError if the file does not hold them."""
-        return read_clip(
-            self.source, self.path, gait=self.gait, start=self.start, end=self.end
+        """Returns the frames, with recording, rate and animal in the provenance.
+
+        Raises:
+            InputError: if the file does not hold them.
+        """
+        clip = read_clip(
+            self.source,
+            self.path,
+            gait=self.gait,
+            start=self.start,
+            end=self.end,
+            fps=self.fps,
         )
+        origin = {"recording": self.recording, "frames_per_second": f"{clip.fps:g}"}
+        if self.animal is not None:
+            origin["animal"] = self.animal
+        return replace(clip, provenance={**clip.provenance, **origin})
 
 
 def read_segments(data_dir: Path) -> list[Segment]:
@@ -92,6 +130,20 @@ def read_segments(data_dir: Path) -> list[Segment]:
             )
         segments.append(segment)
     return segments
+
+
+def select_labels(segments: Iterable[Segment], labels: Iterable[str]) -> list[Segment]:
+    """Returns the segments of ``labels``, such as ``dog-trot`` (empty: all).
+
+    Raises:
+        InputError: if a label, or everything, has no segment; names those that do.
+    """
+    segments = list(segments)
+    if not segments:
+        raise InputError("segments.csv has no stretch of a source that can be read.")
+    available = list(dict.fromkeys(segment.label for segment in segments))
+    wanted = [check_choice("label", label, available) for label in labels]
+    return [s for s in segments if not wanted or s.label in wanted]
 
 
 def select_segments(

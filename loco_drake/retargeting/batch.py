@@ -1,13 +1,17 @@
 """Many recordings -> many Motion files."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from loco_drake.datasets.segments import Segment
+from loco_drake.datasets.split import Split
 from loco_drake.errors import InputError
-from loco_drake.models.robots import Robot
-from loco_drake.motion import FPS, save_motion
+from loco_drake.keypoints import KeypointClip
+from loco_drake.models.robots import Robot, get_robot
+from loco_drake.motion import FPS, Motion, save_motion
+from loco_drake.parallel import map_in_workers
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import RetargetReport, retarget_clip
 
@@ -29,29 +33,74 @@ class Outcome:
     error: str | None
 
 
+class SegmentRetargeter:
+    """Retargets one segment after the other, with one solver.
+
+    Args:
+        robot: to move.
+        split: gives the side that goes into the provenance; None leaves it out.
+    """
+
+    def __init__(self, robot: Robot, split: Split | None = None) -> None:
+        self.robot = robot
+        self._split = split
+        self._solver = LegSolver(robot, FPS)
+
+    def __call__(
+        self, segment: Segment
+    ) -> tuple[KeypointClip, Motion, RetargetReport] | str:
+        """Returns clip, motion and report, or the sentence that says what failed."""
+        try:
+            clip = segment.read()
+            if self._split is not None:
+                side = {"split": self._split.side(segment)}
+                clip = replace(clip, provenance={**clip.provenance, **side})
+            return clip, *retarget_clip(clip, self.robot, solver=self._solver)
+        except InputError as error:
+            return str(error)
+        except (ArithmeticError, LookupError, RuntimeError, ValueError) as error:
+            # Whatever a solver or a table breaks on is the fault of this clip alone.
+            return f"{type(error).__name__}: {error}"
+
+
+class _Writer:
+    """Retargets and saves, see :func:`retarget_segments`."""
+
+    def __init__(self, robot: str, out_dir: Path, split: Split | None) -> None:
+        self._retarget = SegmentRetargeter(get_robot(robot), split)
+        self._out_dir = out_dir
+
+    def __call__(self, segment: Segment) -> Outcome:
+        path = self._out_dir / f"{segment.name}.npz"
+        result = self._retarget(segment)
+        if isinstance(result, str):
+            return Outcome(segment, path, None, result)
+        _, motion, report = result
+        save_motion(motion, path)
+        return Outcome(segment, path, report, None)
+
+
 def retarget_segments(
-    segments: Iterable[Segment], robot: Robot, out_dir: Path
+    segments: Iterable[Segment],
+    robot: Robot,
+    out_dir: Path,
+    split: Split | None = None,
+    workers: int = 1,
 ) -> Iterator[Outcome]:
-    """Retargets segments one by one, and writes ``out_dir/SEGMENT.npz`` for each.
+    """Retargets segments, and writes ``out_dir/SEGMENT.npz`` for each.
 
     A recording that cannot be read or retargeted is reported in its outcome and does
-    not stop the others. Only one clip is in memory at a time.
+    not stop the others. A process has only one clip at a time in memory.
 
     Args:
         segments: from :func:`loco_drake.datasets.segments.read_segments`.
         robot: to move.
         out_dir: made if need be; files of the same name are replaced.
+        split: gives the side that goes into the provenance; None leaves it out.
+        workers: processes.
 
     Yields:
-        One outcome for each segment, as soon as it is done.
+        One outcome for each segment, in their order, as soon as it is done.
     """
-    solver = LegSolver(robot, FPS)
-    for segment in segments:
-        path = Path(out_dir) / f"{segment.name}.npz"
-        try:
-            motion, report = retarget_clip(segment.read(), robot, solver=solver)
-        except InputError as error:
-            yield Outcome(segment, path, None, str(error))
-        else:
-            save_motion(motion, path)
-            yield Outcome(segment, path, report, None)
+    make = partial(_Writer, robot.name, Path(out_dir), split)
+    return map_in_workers(make, segments, workers)

@@ -45,17 +45,19 @@ class SmoothingConfig:
 class RetargetConfig:
     """How the keypoints of one source become targets for a robot."""
 
-    # The animal's stance height is this percentile of the height of the middle between
-    # withers and hip.
+    # The source's stance height in m, where all its clips are of one body that may
+    # creep or stand tall. Without it, it is clip by clip this percentile of the height
+    # of the middle between withers and hip.
+    stance_height: float | None = None
     stance_height_percentile: float = 50.0
     # Where the virtual hip joints lie, on the line from hip to withers: ahead of the
-    # withers and ahead of the hip, as fractions of the stance height.
+    # withers and ahead of the hip, and to the sides of that line, as fractions of the
+    # stance height.
     front_hip: float = 0.0
     rear_hip: float = 0.0
+    hip_spread: float = 0.0
     # Added to the height of the robot's trunk, m.
     base_height_offset: float = 0.0
-    # Added to the distance of each toe from the trunk's midline, m.
-    lateral_offset: float = 0.0
     # Multiplies the height of the toes beside the scale.
     swing_height: float = 1.0
     contact: ContactConfig = field(default_factory=ContactConfig)
@@ -99,6 +101,7 @@ def _check(config: RetargetConfig, path: Path) -> None:
         ("smoothing.base", config.smoothing.base),
         ("smoothing.toes", config.smoothing.toes),
         ("swing_height", config.swing_height),
+        ("stance_height", 1.0 if (H := config.stance_height) is None else H),
         *((f"contact.{name}", value) for name, value in _values(config.contact)),
     ]
     for name, value in positive:

@@ -47,9 +47,9 @@ def summarize(clip: KeypointClip) -> tuple[ClipSummary, NDArray[np.bool_]]:
         InputError: if the clip is not of an animal on its feet.
     """
     config = load_config(clip.source)
-    height = stance_height(clip, config.stance_height_percentile)
+    height = stance_height(clip, config)
     contacts = detect_contacts(clip, height, config.contact)
-    timing = gait_timing(clip_track(clip))
+    timing = gait_timing(clip_track(clip, height))
     summary = ClipSummary(
         frames=len(clip),
         fps=clip.fps,

@@ -74,7 +74,7 @@ def retarget_clip(
     began = time.perf_counter()
     config = config or load_config(clip.source)
     solver = solver or LegSolver(robot, FPS)
-    height = stance_height(clip, config.stance_height_percentile)
+    height = stance_height(clip, config)
     raw_contacts = detect_contacts(clip, height, config.contact)
     resampled = resample(clip, FPS)
     formula = scale_to_robot(resampled, height, robot, config)

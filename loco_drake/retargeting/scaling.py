@@ -9,14 +9,16 @@ Ry(theta):
     psi      = atan2(w_y - h_y, w_x - h_x)                      heading
     theta    = -atan2(w_z - h_z, hypot(w_x - h_x, w_y - h_y))   pitch, nose down > 0
     p_WB     = alpha (w + h) / 2 + (0, 0, base_height_offset)   roll is 0
-    p_WA     = w + front_hip H d   or   h + rear_hip H d        the animal's virtual hip
-    p_WV     = p_WB + R (p_BHip + (0, abduction offset +- lateral_offset, 0))
+    p_WA     = w + front_hip H d +- hip_spread H s              the animal's virtual hip,
+               h + rear_hip H d +- hip_spread H s                 front and rear
+    p_WV     = p_WB + R (p_BHip + (0, abduction offset, 0))
     p_WF_xy  = (p_WV + alpha |p_WT - p_WA| u)_xy                T the animal's toe
     p_WF_z   = foot_radius + swing_height alpha max(T_z, 0)     the toe's height is kept
 
-where d is the unit vector from hip to withers and u the one from A to T. The robot's
-virtual hip V is its thigh joint at zero abduction, so that an animal whose toes fall
-under its midline stands with the robot's legs straight down.
+where d is the unit vector from hip to withers, s the horizontal one to its left and u
+the one from A to T. The robot's virtual hip V is its thigh joint at zero abduction, so
+that an animal whose toes fall under its virtual hips stands with the robot's legs
+straight down.
 """
 
 from dataclasses import dataclass, replace
@@ -65,20 +67,22 @@ class Targets:
         return quat_rotate(q_BW, self.p_WF - self.p_WB[:, None])
 
 
-def stance_height(clip: KeypointClip, percentile: float) -> float:
+def stance_height(clip: KeypointClip, config: RetargetConfig) -> float:
     """Returns the animal's stance height in m: of the middle of withers and hip.
 
+    It is that of the configuration, or else a percentile over the clip.
+
     Raises:
-        InputError: if it is not above the ground.
+        InputError: if the middle lies below the ground.
     """
     middle = (clip.withers[:, 2] + clip.hip[:, 2]) / 2
-    height = float(np.percentile(middle, percentile))
+    height = float(np.percentile(middle, config.stance_height_percentile))
     if height <= 0:
         raise InputError(
             f"The middle of withers and hip lies {height:.3g} m over the ground, "
             "so this is no clip of an animal on its feet."
         )
-    return height
+    return height if config.stance_height is None else config.stance_height
 
 
 def resample(clip: KeypointClip, fps: float) -> KeypointClip:
@@ -121,11 +125,10 @@ def scale_to_robot(
     d = (trunk / np.linalg.norm(trunk, axis=-1, keepdims=True)) * height
     front = clip.withers + config.front_hip * d
     rear = clip.hip + config.rear_hip * d
-    p_WA = np.stack((front, front, rear, rear), axis=1)
-    side = (
-        robot.abduction_offset + np.sign(robot.abduction_offset) * config.lateral_offset
-    )
-    p_BV = robot.p_BHip + side[:, None] * np.array([0.0, 1.0, 0.0])
+    s = np.stack((-np.sin(yaw), np.cos(yaw), np.zeros_like(yaw)), axis=-1)
+    spread = config.hip_spread * height * np.sign(robot.abduction_offset)
+    p_WA = np.stack((front, front, rear, rear), axis=1) + spread[:, None] * s[:, None]
+    p_BV = robot.p_BHip + robot.abduction_offset[:, None] * np.array([0.0, 1.0, 0.0])
     p_WV = p_WB[:, None] + quat_rotate(base.q_WB[:, None], p_BV)
 
     p_WF = p_WV + alpha * (clip.toes - p_WA)

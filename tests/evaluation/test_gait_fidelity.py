@@ -14,7 +14,7 @@ from loco_drake.gait_timing import (
 from loco_drake.keypoints import KeypointClip
 from loco_drake.models.robots import get_robot
 from loco_drake.retargeting.retarget import retarget_clip
-from tests.synthetic import make_dog
+from tests.synthetic import STANCE_HEIGHT, make_dog
 
 GO2 = get_robot("go2")
 
@@ -54,7 +54,7 @@ def trot():
     dog = make_dog("trot")
     clip = KeypointClip("dog", "trot", 60.0, dog.withers, dog.hip, dog.toes, {})
     motion, _ = retarget_clip(clip, GO2)
-    return gait_timing(clip_track(clip)), motion_track(motion, GO2)
+    return gait_timing(clip_track(clip, STANCE_HEIGHT)), motion_track(motion, GO2)
 
 
 def errors(source, track):

@@ -52,7 +52,7 @@ def test_formula_against_scipy_frame_by_frame(name):
         front_hip=0.05,
         rear_hip=-0.11,
         base_height_offset=-0.02,
-        lateral_offset=0.03,
+        hip_spread=0.06,
         swing_height=1.2,
     )
     targets = scale_to_robot(clip, height, robot, config)
@@ -72,9 +72,11 @@ def test_formula_against_scipy_frame_by_frame(name):
         for leg in range(4):
             left = 1 if leg % 2 == 0 else -1
             start = w + 0.05 * height * along if leg < 2 else h - 0.11 * height * along
+            # .06 of .5 m to the left of the horizontal direction of the trunk.
+            start = start + left * 0.03 * np.array([-np.sin(yaw), np.cos(yaw), 0.0])
             leg_vector = clip.toes[k, leg] - start
             length = np.linalg.norm(leg_vector)
-            side = robot.abduction_offset[leg] + left * 0.03
+            side = robot.abduction_offset[leg]
             p_WV = p_WB + R_WB.apply(robot.p_BHip[leg] + [0, side, 0])
             p_WF = p_WV + alpha * length * (leg_vector / length)
             np.testing.assert_allclose(targets.p_WF[k, leg, :2], p_WF[:2], atol=1e-12)
@@ -100,13 +102,15 @@ def test_heading_has_no_jumps_when_the_animal_turns_round():
     np.testing.assert_allclose(targets.yaw, angle, atol=1e-9)
 
 
-def test_stance_height_is_the_percentile_of_the_middle():
+def test_stance_height_is_the_percentile_of_the_middle_or_that_of_the_source():
     clip = clip_of([[0, 0, 0.5], [0, 0, 0.6]], [[-1, 0, 0.3]] * 2, np.zeros((2, 4, 3)))
-    assert stance_height(clip, 0.0) == pytest.approx(0.40)
-    assert stance_height(clip, 50.0) == pytest.approx(0.425)
+    lowest = RetargetConfig(stance_height_percentile=0.0)
+    assert stance_height(clip, lowest) == pytest.approx(0.40)
+    assert stance_height(clip, RetargetConfig()) == pytest.approx(0.425)
+    assert stance_height(clip, RetargetConfig(stance_height=0.3)) == 0.3
     sunk = clip_of([[0, 0, -1]], [[-1, 0, 0.3]], np.zeros((1, 4, 3)))
     with pytest.raises(InputError, match="no clip of an animal on its feet"):
-        stance_height(sunk, 50.0)
+        stance_height(sunk, RetargetConfig(stance_height=0.3))
 
 
 def test_resampling_keeps_a_cubic_exactly_and_the_last_whole_step():

@@ -1,0 +1,96 @@
+"""The command ``evaluate retargeting``."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import Progress
+
+from loco_drake.cli.output import print_failed, print_table, write_json
+from loco_drake.datasets.registry import data_dir
+from loco_drake.datasets.segments import read_segments, select_labels
+from loco_drake.errors import InputError, check_choice
+from loco_drake.evaluation.retargeting import score_segments, summarize
+from loco_drake.models.robots import ROBOTS, get_robot
+
+
+@dataclass(kw_only=True)
+class EvaluateRetargeting:
+    """Retargets stretches of segments.csv and says how well that went.
+
+    Slip, penetration, limits, errors of the toes, and how well the rhythm of the gait
+    is kept; docs/retargeting.md defines each figure. No Motion file is written.
+    """
+
+    robot: str = "go2"
+    """The robot: go2, a1 or all."""
+    labels: tuple[str, ...] = ()
+    """Such as dog-trot dog-pace. Default: all that segments.csv holds."""
+    data_dir: Path | None = None
+    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
+    workers: int = 1
+    """Processes."""
+    seeds: int = 1
+    """As in every evaluation; retargeting is not random, so one seed says it all."""
+    seed: int = 0
+    """As in every command; nothing here is random."""
+    json: Path | None = None
+    """Writes the figures to this file."""
+
+    def run(self) -> int:
+        """Prints a table for each robot; returns 1 if a clip failed, else 0.
+
+        Raises:
+            InputError: if an option is wrong.
+        """
+        check_choice("robot", self.robot, (*ROBOTS, "all"))
+        if self.seeds < 1:
+            raise InputError(f"--seeds must be 1 or more, not {self.seeds}.")
+        segments = select_labels(read_segments(data_dir(self.data_dir)), self.labels)
+        names = list(ROBOTS) if self.robot == "all" else [self.robot]
+        robots: dict[str, Any] = {}
+        with Progress(console=Console(stderr=True), transient=True) as progress:
+            for name in names:
+                scores = score_segments(segments, get_robot(name), self.workers)
+                tracked = progress.track(
+                    scores, total=len(segments), description=f"Retargeting to {name}"
+                )
+                robots[name] = summarize(list(tracked))
+        write_json(self.json, {"robots": robots})
+        for name, result in robots.items():
+            speed = result["frames_per_second"] or 0.0
+            title = f"{name}: {speed:.0f} frames/s in one process"
+            print_table(title, list(_COLUMNS), _rows(result))
+        failed = [
+            item for result in robots.values() for item in result["failed"].items()
+        ]
+        print_failed(failed)
+        return 1 if failed else 0
+
+
+# Column: key, factor, digits.
+_COLUMNS = {
+    "label": ("", 1, 0),
+    "clips": ("clips", 1, 0),
+    "slip mm/s": ("stance_slip_median_mps", 1000, 2),
+    "sunk mm": ("penetration_max_m", 1000, 2),
+    "limits": ("joint_limit_violations", 1, 0),
+    "speed ratio": ("joint_speed_ratio_max", 1, 2),
+    "toe error mm": ("toe_error_rmse_m", 1000, 2),
+    "correction mm": ("correction_rmse_m", 1000, 1),
+    "period %": ("stride_period_error", 100, 2),
+    "lag % of stride": ("phase_lag_error", 100, 2),
+    "duty %": ("duty_factor_error", 100, 1),
+}
+
+
+def _rows(result: dict[str, Any]) -> Iterator[list[str]]:
+    named = {**result["labels"], "all of these": result["all"], **result["other"]}
+    for name, figures in named.items():
+        row = [name]
+        for key, factor, digits in list(_COLUMNS.values())[1:]:
+            value = figures[key]
+            row.append("-" if value is None else f"{value * factor:.{digits}f}")
+        yield row

@@ -1,0 +1,139 @@
+"""A robot of 5.5 kg under model-predictive control, simulated with RF-MPC.
+
+RF-MPC: Ding, Pandala, Li, Shin, Park (T-RO 2021). A file holds 27 columns: feet FL, FR,
+RL, RR; centre of the trunk; hips FL, FR, RL, RR; x forward. Each run is 5 s from rest,
+in 500 rows of 100 or 1000 rows of 200 frames/s; the file does not say which.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.datasets.normalize import check_range, start_along_x
+from loco_drake.datasets.simulated import read_points, trunk_ends
+from loco_drake.errors import InputError
+from loco_drake.keypoints import KeypointClip
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+FORMAT = "an mpc keypoint file"
+# Of the front left hip in the trunk's frame, m.
+HALF_SIZE = (0.1505, 0.044)
+
+RATES = (100.0, 200.0)
+RUN_SECONDS = 5.0
+# The controller's swings last .15 s (bound, gallop, trot), .10 s (crawl) or .05 s
+# (pace); crawl alone has its feet down for more than two thirds of the stride.
+SWING_SECONDS = (0.05, 0.15)
+CRAWL_SWING_SECONDS = 0.10
+CRAWL_DUTY = 0.68
+# A swing counts half a frame too many on average, 10 % of the shortest.
+SWING_TOLERANCE = 0.2
+
+# Feet stand exactly still; the text has six decimals.
+STILL = 1e-5
+
+
+def read_mpc(
+    path: Path,
+    *,
+    gait: str,
+    start: int | None = None,
+    end: int | None = None,
+    fps: float | None = None,
+) -> KeypointClip:
+    """Reads frames ``start`` to ``end`` (exclusive) of a simulated run.
+
+    Withers and hip are the middles of the front and rear hips. The median height of
+    all standing feet of the run becomes the ground: a pacing robot stands 12 mm above
+    that of its simulator.
+
+    Args:
+        path: a keypoint text file.
+        gait: what the robot does.
+        start: first frame, from 0; None for the start of the file, at rest.
+        end: frame after the last; None for the end of the file.
+        fps: frames per second; None to infer them from the swings, see
+            :func:`infer_rate`.
+
+    Raises:
+        InputError: if the file is not of this format, the stretch not within it, or its
+            rate not to be found.
+    """
+    path = Path(path)
+    points = read_points(path, FORMAT)
+    feet, centre, hips = points[:, :4], points[:, 4], points[:, 5:]
+    withers, hip = trunk_ends(centre, hips, HALF_SIZE, path, FORMAT)
+    first, stop = check_range(start, end, len(points), path.name)
+    rate = fps or infer_rate(feet, path)
+    ground = np.array([0.0, 0.0, ground_height(feet)])
+    withers, hip, toes = start_along_x(
+        *(p[first:stop] - ground for p in (withers, hip, feet))
+    )
+    return KeypointClip(
+        source="mpc",
+        gait=gait,
+        fps=rate,
+        withers=withers,
+        hip=hip,
+        toes=toes,
+        provenance={"file": path.name, "frames": f"{first}-{stop}"},
+    )
+
+
+def ground_height(feet: Array) -> float:
+    """Returns the median height in m of the feet (T, 4, 3) that stand still."""
+    still = _still(feet)
+    return float(np.median(feet[1:, :, 2][still])) if still.any() else 0.0
+
+
+def infer_rate(feet: Array, path: Path) -> float:
+    """Returns the frames per second of feet (T, 4, 3).
+
+    The controller swings every foot for a fixed time, so the frames of a swing tell the
+    rate, also of a file that was cut. Without a whole swing the length of the run does.
+
+    Raises:
+        InputError: if neither tells.
+    """
+    still = _still(feet)
+    swings = _whole_runs(~still)
+    stances = _whole_runs(still)
+    if len(swings) and len(stances):
+        swing, stance = float(np.median(swings)), float(np.median(stances))
+        crawls = stance > CRAWL_DUTY * (stance + swing)
+        known = (CRAWL_SWING_SECONDS,) if crawls else SWING_SECONDS
+        # The frame of lift-off and that of touchdown both count as moving.
+        errors = {
+            rate: min(abs((swing - 0.5) / rate / seconds - 1) for seconds in known)
+            for rate in RATES
+        }
+        best = min(RATES, key=lambda rate: errors[rate])
+        if errors[best] <= SWING_TOLERANCE:
+            return best
+    for rate in RATES:
+        if len(feet) == round(rate * RUN_SECONDS):
+            return rate
+    raise InputError(
+        f"{path} does not tell its rate, since no foot swings in it as this controller "
+        "has it; give its frames per second with --fps 100 or --fps 200."
+    )
+
+
+def _still(feet: Array) -> Bools:
+    """Returns which feet do not move from one frame to the next, shape (T - 1, 4)."""
+    still: Bools = np.linalg.norm(np.diff(feet, axis=0), axis=-1) < STILL
+    return still
+
+
+def _whole_runs(flags: Bools) -> list[int]:
+    """Returns lengths of the runs of True in the columns that no end of them cuts."""
+    lengths: list[int] = []
+    for column in flags.T:
+        edges = np.flatnonzero(np.diff(column.astype(np.int8)))
+        opens = edges[:-1][column[edges[:-1] + 1]]
+        closes = edges[1:][column[edges[:-1] + 1]]
+        lengths.extend(int(n) for n in closes - opens)
+    return lengths

@@ -1,0 +1,204 @@
+"""How well recordings are retargeted, label by label.
+
+The figures of a clip are those of :mod:`loco_drake.motion_quality`,
+:class:`loco_drake.retargeting.retarget.RetargetReport` and
+:mod:`loco_drake.evaluation.gait_fidelity`. A label's figures are made of its clips':
+
+======================== ==============================================================
+stance_slip_median_mps   median over all steps of all toes in stance of all clips
+penetration_max_m        the worst clip's
+joint_limit_violations   summed
+joint_speed_ratio_max    the worst clip's
+toe_error_rmse_m         root of the mean square over all frames and toes of all clips
+correction_rmse_m        the same
+stride_period_error, phase_lag_error, duty_factor_error
+                         mean over the clips of at least three strides
+clips                    their number; those that failed are not counted
+frames_per_second        frames of motion over seconds of computing in one process,
+                         reading excluded
+======================== ==============================================================
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.datasets.segments import Segment
+from loco_drake.evaluation.gait_fidelity import GaitFidelity, gait_fidelity
+from loco_drake.gait_timing import clip_track, gait_timing, motion_track
+from loco_drake.gaits import LABELS
+from loco_drake.models.robots import Robot, get_robot
+from loco_drake.motion_quality import stance_slip_speeds, toe_trajectories
+from loco_drake.parallel import map_in_workers
+from loco_drake.retargeting.batch import SegmentRetargeter
+from loco_drake.retargeting.retarget import RetargetReport
+
+Array = NDArray[np.float64]
+
+# Figures of which the worst clip is told beside the label's own.
+_WORST_OF_REPORT = (
+    "stance_slip_median_mps",
+    "penetration_max_m",
+    "joint_speed_ratio_max",
+    "toe_error_rmse_m",
+    "correction_rmse_m",
+)
+_FIDELITY = ("stride_period_error", "phase_lag_error", "duty_factor_error")
+
+
+@dataclass(frozen=True)
+class ClipScore:
+    """The figures of one clip.
+
+    Attributes:
+        segment: the stretch of a recording.
+        report: what retargeting says.
+        slip_speeds: of each step of each toe in stance, m/s, shape (N,).
+        fidelity: None if there are fewer than three strides.
+    """
+
+    segment: Segment
+    report: RetargetReport
+    slip_speeds: Array
+    fidelity: GaitFidelity | None
+
+
+@dataclass(frozen=True)
+class FailedClip:
+    """A clip that could not be retargeted, and why."""
+
+    segment: Segment
+    error: str
+
+
+class _Scorer:
+    """Retargets and scores, see :func:`score_segments`."""
+
+    def __init__(self, robot: str) -> None:
+        self._retarget = SegmentRetargeter(get_robot(robot))
+
+    def __call__(self, segment: Segment) -> ClipScore | FailedClip:
+        result = self._retarget(segment)
+        if isinstance(result, str):
+            return FailedClip(segment, result)
+        clip, motion, report = result
+        robot = self._retarget.robot
+        p_WF = toe_trajectories(motion, robot)
+        track = clip_track(clip, robot.stand_height / report.scale)
+        return ClipScore(
+            segment=segment,
+            report=report,
+            slip_speeds=stance_slip_speeds(p_WF, robot.foot_radius, motion.fps),
+            fidelity=gait_fidelity(
+                gait_timing(track), gait_timing(motion_track(motion, robot))
+            ),
+        )
+
+
+def score_segments(
+    segments: Iterable[Segment], robot: Robot, workers: int = 1
+) -> Iterator[ClipScore | FailedClip]:
+    """Retargets segments, and yields the figures of each, in their order.
+
+    A process has only one clip at a time in memory.
+
+    Args:
+        segments: from :func:`loco_drake.datasets.segments.read_segments`.
+        robot: to move.
+        workers: processes.
+    """
+    return map_in_workers(partial(_Scorer, robot.name), segments, workers)
+
+
+def summarize(scores: Sequence[ClipScore | FailedClip]) -> dict[str, Any]:
+    """Returns the figures of one robot: by label, of all, and of other labels.
+
+    Args:
+        scores: of all segments.
+
+    Returns:
+        What ``loco-drake evaluate retargeting`` writes for a robot: "labels", "all",
+        "frames_per_second", "failed", and "other" for labels that are not among the
+        fifteen, which "all" leaves out.
+    """
+    names = [str(label) for label in LABELS]
+    by_label: dict[str, list[ClipScore]] = {}
+    for score in scores:
+        clips = by_label.setdefault(score.segment.label, [])
+        if isinstance(score, ClipScore):
+            clips.append(score)
+    done = [clip for clips in by_label.values() for clip in clips]
+    known = [clip for clip in done if clip.segment.label in names]
+    frames = sum(clip.report.frames for clip in done)
+    seconds = sum(clip.report.frames / clip.report.frames_per_second for clip in done)
+    return {
+        "labels": {name: figures(by_label[name]) for name in names if name in by_label},
+        "all": figures(known),
+        "frames_per_second": frames / seconds if done else None,
+        "other": {k: figures(v) for k, v in by_label.items() if k not in names},
+        "failed": {
+            score.segment.name: score.error
+            for score in scores
+            if isinstance(score, FailedClip)
+        },
+    }
+
+
+def figures(clips: Sequence[ClipScore]) -> dict[str, Any]:
+    """Returns the figures of clips taken together; null ones come with a reason."""
+    fidelities = [clip.fidelity for clip in clips if clip.fidelity is not None]
+    reports = [clip.report for clip in clips]
+    slips = [clip.slip_speeds for clip in clips]
+    steps = np.concatenate(slips) if slips else np.empty(0)
+    frames = np.array([report.frames for report in reports])
+
+    def pooled(key: str) -> float | None:
+        squares = np.array([getattr(report, key) ** 2 for report in reports])
+        return float(np.sqrt(squares @ frames / frames.sum())) if reports else None
+
+    def worst(key: str) -> float | None:
+        return max((getattr(report, key) for report in reports), default=None)
+
+    result: dict[str, Any] = {
+        "stance_slip_median_mps": float(np.median(steps)) if len(steps) else None,
+        "penetration_max_m": worst("penetration_max_m"),
+        "joint_limit_violations": sum(r.joint_limit_violations for r in reports),
+        "joint_speed_ratio_max": worst("joint_speed_ratio_max"),
+        "toe_error_rmse_m": pooled("toe_error_rmse_m"),
+        "correction_rmse_m": pooled("correction_rmse_m"),
+    }
+    for key in _FIDELITY:
+        values = [getattr(fidelity, key) for fidelity in fidelities]
+        result[key] = float(np.mean(values)) if values else None
+    result["clips"] = len(clips)
+    result["clips_of_three_strides"] = len(fidelities)
+    result["worst"] = _worst_clips(clips)
+    reasons = []
+    if not clips:
+        reasons.append("no clip could be retargeted")
+    elif not len(steps):
+        reasons.append("no toe ever stands")
+    if clips and not fidelities:
+        reasons.append("no clip holds three strides")
+    if reasons:
+        result["reason"] = "; ".join(reasons)
+    return result
+
+
+def _worst_clips(clips: Sequence[ClipScore]) -> dict[str, dict[str, Any]]:
+    """Returns the highest value of each figure, and the name of its clip."""
+    worst: dict[str, dict[str, Any]] = {}
+    for clip in clips:
+        own: dict[str, float | None] = {
+            key: getattr(clip.report, key) for key in _WORST_OF_REPORT
+        }
+        if clip.fidelity is not None:
+            own.update(asdict(clip.fidelity))
+        for key, value in own.items():
+            if value is not None and (key not in worst or value > worst[key]["value"]):
+                worst[key] = {"value": value, "clip": clip.segment.name}
+    return worst

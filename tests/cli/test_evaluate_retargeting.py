@@ -1,0 +1,66 @@
+import json
+
+import pytest
+import tyro
+
+from loco_drake.cli.evaluate_retargeting import EvaluateRetargeting
+from loco_drake.errors import InputError
+
+KEYS = {
+    "stance_slip_median_mps",
+    "penetration_max_m",
+    "joint_limit_violations",
+    "joint_speed_ratio_max",
+    "toe_error_rmse_m",
+    "correction_rmse_m",
+    "stride_period_error",
+    "phase_lag_error",
+    "duty_factor_error",
+    "clips",
+}
+
+
+def command(*arguments):
+    return tyro.cli(EvaluateRetargeting, args=[str(a) for a in arguments])
+
+
+def test_both_robots_with_a_bad_clip(made_data, tmp_path, capsys):
+    """A stretch beyond the end of its file fails; the others are counted."""
+    table = (made_data / "segments.csv").read_text()
+    (tmp_path / "dog_mann").symlink_to(made_data / "dog_mann")
+    extra = "dog_mann,keypoints/made_pace.txt,pace,0,9999,60,1,\n"
+    turn = "dog_mann,keypoints/made_pace.txt,turn_left,0,200,60,1,\n"
+    (tmp_path / "segments.csv").write_text(table + extra + turn)
+    options = ("--data-dir", tmp_path, "--robot", "all", "--seeds", 1)
+    labels = ("--labels", "dog-pace", "dog-turn_left")
+    file = tmp_path / "a.json"
+    assert command(*options, *labels, "--json", file).run() == 1
+    printed = capsys.readouterr()
+    failed = "Failed: dog-pace-made_pace-0-9999: Frames 0 to 9999"
+    assert printed.err.count(failed) == 2
+    assert printed.out.count("dog-pace") == 2
+    robots = json.loads(file.read_text())["robots"]
+    assert set(robots) == {"go2", "a1"}
+    for result in robots.values():
+        assert set(result["labels"]) == {"dog-pace"}
+        assert set(result["other"]) == {"dog-turn_left"}
+        assert result["frames_per_second"] > 0
+        assert "dog-pace-made_pace-0-9999" in result["failed"]
+        for figures in (result["labels"]["dog-pace"], result["all"]):
+            assert set(figures) >= KEYS
+            assert figures["clips"] == 1
+            assert all(isinstance(figures[key], int | float) for key in KEYS)
+
+
+def test_wrong_input_raises_one_sentence(made_data, tmp_path):
+    data = ("--data-dir", made_data)
+    wrong = {
+        ("--robot", "spot", *data): "'spot'; the choices are go2, a1, all",
+        ("--labels", "dog-fly", *data): "'dog-fly'; the choices are dog-pace, dog-trot",
+        ("--seeds", 0, *data): "--seeds must be 1 or more",
+        ("--workers", 0, *data): "--workers must be 1 or more",
+        ("--data-dir", tmp_path / "no"): "There is no data folder",
+    }
+    for arguments, reason in wrong.items():
+        with pytest.raises(InputError, match=reason):
+            command(*arguments).run()
