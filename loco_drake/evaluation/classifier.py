@@ -27,7 +27,6 @@ class ClassifierConfig:
     """What is needed to build a :class:`GaitClassifier`.
 
     Attributes:
-        robot: whose motion it is for.
         labels: names of the gait labels that it tells apart.
         frames_per_patch: frames that are put side by side as one step of time.
         width: channels.
@@ -37,7 +36,6 @@ class ClassifierConfig:
         dropout: probability, while training.
     """
 
-    robot: str
     labels: tuple[str, ...]
     frames_per_patch: int = 4
     width: int = 64

@@ -10,7 +10,9 @@ Channels
 Summary
     For each channel its mean over time, its standard deviation, and the root mean
     squares of its change from frame to frame and of the change of that; then the
-    correlations of the six pairs of thigh angles, which tell a pace from a trot.
+    correlations of the six pairs of thigh angles, which tell a pace from a trot. All
+    are rounded to RESOLUTION: a roll that is exactly zero in one set and a hundred
+    thousandth of a radian in the other is no difference.
 Mirror image
     Left and right are a matter of chance in recordings, and generators learn from
     mirror images too. Each trajectory therefore counts with its mirror image, one half
@@ -23,7 +25,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.generation.features import CONTACTS, JOINTS, motion_features
+from loco_drake.generation.features import (
+    CONTACTS,
+    JOINTS,
+    VELOCITY,
+    YAW_RATE,
+    motion_features,
+)
 from loco_drake.models.robots import Robot
 from loco_drake.motion import FPS, Motion
 
@@ -34,7 +42,20 @@ FRAMES = round(SECONDS * FPS)
 CHANNELS = CONTACTS.start
 _THIGHS = slice(JOINTS.start + 1, JOINTS.stop, 3)
 _PAIRS = np.triu_indices(4, k=1)
-SUMMARY_SIZE = 4 * CHANNELS + len(_PAIRS[0])
+# Where each part of a summary lies.
+SUMMARY = {
+    "mean": slice(0, CHANNELS),
+    "spread": slice(CHANNELS, 2 * CHANNELS),
+    "change": slice(2 * CHANNELS, 3 * CHANNELS),
+    "change of change": slice(3 * CHANNELS, 4 * CHANNELS),
+    "correlation": slice(4 * CHANNELS, 4 * CHANNELS + len(_PAIRS[0])),
+}
+SUMMARY_SIZE = SUMMARY["correlation"].stop
+# In the units of the channels: .3 mm/s, .001 rad/s, .03 mm, .0001 rad.
+RESOLUTION = np.full(SUMMARY_SIZE, 1e-4)
+for _part in list(SUMMARY.values())[:4]:
+    RESOLUTION[_part][VELOCITY] = RESOLUTION[_part][YAW_RATE] = 1e-3
+RESOLUTION[SUMMARY["correlation"]] = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +138,7 @@ def summarize(channels: Array) -> Array:
     thighs = thighs - thighs.mean(axis=-2, keepdims=True)
     thighs /= np.maximum(thighs.std(axis=-2, keepdims=True), 1e-3)
     correlation = np.einsum("...ti,...tj->...ij", thighs, thighs) / channels.shape[-2]
-    return np.concatenate(
+    summary = np.concatenate(
         (
             channels.mean(axis=-2),
             channels.std(axis=-2),
@@ -127,6 +148,8 @@ def summarize(channels: Array) -> Array:
         ),
         axis=-1,
     )
+    rounded: Array = np.round(summary / RESOLUTION) * RESOLUTION
+    return rounded
 
 
 def label_weights(labels: NDArray[np.int64]) -> Array:

@@ -22,7 +22,8 @@ from loco_drake.generation.train_generator import (
     stitched_clips,
     train_generator,
 )
-from loco_drake.generation.train_tokenizer import score_tokenizer, train_tokenizer
+from loco_drake.generation.tokenizer_score import score_tokenizer
+from loco_drake.generation.train_tokenizer import train_tokenizer
 from loco_drake.generation.training import LoopSettings
 
 TINY = TokenizerConfig(width=24, depth=1, frame_width=8, books=2, book_size=16)

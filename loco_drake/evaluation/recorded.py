@@ -1,0 +1,98 @@
+"""Recorded motion of a robot, on the two sides of the split, to compare with."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+from loco_drake.datasets.segments import Segment, read_segments, select_labels
+from loco_drake.datasets.split import TRAIN, VALIDATION, Split
+from loco_drake.errors import InputError
+from loco_drake.evaluation.samples import FRAMES
+from loco_drake.gaits import LABELS
+from loco_drake.models.robots import Robot, get_robot
+from loco_drake.motion import Motion
+from loco_drake.parallel import map_in_workers
+from loco_drake.retargeting.batch import SegmentRetargeter
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """Retargeted stretches of recordings; no subject is on both sides.
+
+    Attributes:
+        train: what models learn from.
+        validation: what they have not seen.
+        failed: stretches that could not be retargeted, and why.
+    """
+
+    train: tuple[Motion, ...]
+    validation: tuple[Motion, ...]
+    failed: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels that both sides have a trajectory of, in the order of LABELS."""
+        sides = [
+            {str(m.label) for m in side if len(m) >= FRAMES}
+            for side in (self.train, self.validation)
+        ]
+        return tuple(str(k) for k in LABELS if all(str(k) in side for side in sides))
+
+
+class _Retarget:
+    """Retargets one segment, see :func:`retarget_recordings`."""
+
+    def __init__(self, robot: str, split: Split) -> None:
+        self._retarget = SegmentRetargeter(get_robot(robot), split)
+
+    def __call__(self, segment: Segment) -> tuple[str, Motion | str]:
+        result = self._retarget(segment)
+        return segment.name, result if isinstance(result, str) else result[1]
+
+
+def retarget_recordings(
+    data_dir: Path, robot: Robot, labels: Iterable[str] = (), workers: int = 1
+) -> Recorded:
+    """Retargets the recordings of the fifteen labels.
+
+    Args:
+        data_dir: holds ``segments.csv``.
+        robot: to move.
+        labels: only these; default: all of the fifteen that there are.
+        workers: processes.
+
+    Raises:
+        InputError: if the folder is unsound, or has nothing of a label.
+    """
+    segments = read_segments(data_dir)
+    names = {str(label) for label in LABELS}
+    wanted = [s for s in select_labels(segments, labels) if s.label in names]
+    make = partial(_Retarget, robot.name, Split(segments))
+    motions, failed = [], {}
+    for name, result in map_in_workers(make, wanted, workers):
+        if isinstance(result, str):
+            failed[name] = result
+        else:
+            motions.append(result)
+    return by_split(motions, failed)
+
+
+def by_split(
+    motions: Sequence[Motion], failed: dict[str, str] | None = None
+) -> Recorded:
+    """Returns motions sorted by the side that their provenance names.
+
+    Raises:
+        InputError: if a motion does not say on which side of the split it is.
+    """
+    sides: dict[str, list[Motion]] = {TRAIN: [], VALIDATION: []}
+    for motion in motions:
+        side = motion.provenance.get("split")
+        if side not in sides:
+            raise InputError(
+                f"A motion of {motion.label} does not say whether it is for training "
+                f"or validation: its provenance lacks the split."
+            )
+        sides[side].append(motion)
+    return Recorded(tuple(sides[TRAIN]), tuple(sides[VALIDATION]), failed or {})
