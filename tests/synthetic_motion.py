@@ -19,7 +19,8 @@ def synthetic_motion(
     turn: float = 0.0,
     period: float = 0.5,
     phase: float = 0.0,
-    recording: str = "made.txt",
+    recording: str = "made",
+    split: str = "train",
     name: str = "go2",
 ) -> Motion:
     """Returns a motion along an arc; the speed in m/s, the turn in rad/s."""
@@ -56,5 +57,5 @@ def synthetic_motion(
             robot, quat_rotate(quat_conjugate(q_HB)[:, None], p_HF)
         ),
         contacts=contacts,
-        provenance={"file": recording},
+        provenance={"recording": recording, "split": split},
     )

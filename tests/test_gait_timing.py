@@ -58,9 +58,9 @@ def test_without_a_rhythm_there_is_no_period():
 def test_duty_factor_by_hand():
     """Nine strides of .4 s, 20 frames; the trunk moves at 1 m/s, stance height .3 m.
 
-    FL stands for 12 steps of 20 ms in each stride, and then swings; FR never leaves the ground but skates
-    along with the trunk; RL stands still at 2 cm, which is too high; RR stands
-    at 1.5 cm, which is not.
+    FL stands for 12 steps of 20 ms in each stride, and then swings; FR never leaves the
+    ground but skates along with the trunk; RL stands still at 2 cm, which is too high;
+    RR stands at 1.5 cm, which is not.
     """
     frames = 200
     stands = np.arange(1, frames) % 20 < 12

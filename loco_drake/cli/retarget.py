@@ -1,5 +1,6 @@
 """The command ``retarget``."""
 
+from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -10,10 +11,16 @@ from rich.progress import Progress
 from loco_drake.cli.output import print_failed, print_table, write_json
 from loco_drake.datasets.registry import data_dir, read_clip
 from loco_drake.datasets.segments import Segment, read_segments, select_segments
+from loco_drake.datasets.split import TRAIN, VALIDATION, Split
 from loco_drake.errors import InputError
 from loco_drake.gaits import LABELS
 from loco_drake.models.robots import get_robot
-from loco_drake.retargeting.batch import Outcome, retarget_segments
+from loco_drake.retargeting.batch import Outcome, retarget_segments, stretches_of
+from loco_drake.retargeting.trajectories import (
+    SECONDS,
+    choose_windows,
+    write_trajectories,
+)
 
 
 @dataclass(kw_only=True)
@@ -22,7 +29,10 @@ class Retarget:
 
     With FILE: one stretch of that recording. Without: every stretch in segments.csv of
     the data folder that holds one of the fifteen gaits, or those asked for by --source
-    and --gait.
+    and --gait. Each file's provenance says whether its recording is for training or
+    for validation, which --seed decides for the whole data folder, by animal or file.
+    From the stretches, trajectories of 2 s that do not overlap are cut into a folder
+    beside theirs, OUT-trajectories.
     """
 
     file: tyro.conf.Positional[Path | None] = None
@@ -41,12 +51,17 @@ class Retarget:
     """Rate of FILE in frames/s. Default: what its format, name or motion tells."""
     out: Path | None = None
     """Folder for the Motion files. Default: motions/ROBOT."""
+    trajectories: int = 10
+    """How many 2 s trajectories to cut for each of the fifteen labels, as far as the
+    recordings hold as many; 0: none. With FILE there are none."""
+    workers: int = 1
+    """Processes."""
     data_dir: Path | None = None
     """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
     json: Path | None = None
     """Writes the figures of each clip to this file."""
     seed: int = 0
-    """As in every command; nothing here is random."""
+    """Which recordings are for validation, and which trajectories are cut."""
 
     def run(self) -> int:
         """Writes the files and prints the table; returns 1 if a clip failed, else 0.
@@ -55,12 +70,16 @@ class Retarget:
             InputError: if an option is wrong, or FILE cannot be retargeted.
         """
         robot = get_robot(self.robot)
-        segments = self._segments()
+        if self.trajectories < 0:
+            raise InputError(
+                f"--trajectories must be 0 or more, not {self.trajectories}."
+            )
+        segments, split = self._segments()
         out = self.out or Path("motions") / self.robot
         outcomes: list[Outcome] = []
         with Progress(console=Console(stderr=True), transient=True) as progress:
             task = progress.add_task("Retargeting", total=len(segments))
-            for outcome in retarget_segments(segments, robot, out):
+            for outcome in retarget_segments(segments, robot, out, split, self.workers):
                 outcomes.append(outcome)
                 progress.advance(task)
         failed = [outcome for outcome in outcomes if outcome.error is not None]
@@ -69,20 +88,38 @@ class Retarget:
         write_json(self.json, {o.segment.name: _figures(o) for o in outcomes})
         rows = [_row(outcome) for outcome in outcomes if outcome.report is not None]
         print_table(f"Motion files in {out}: {len(rows)}", list(_COLUMNS), rows)
+        if split is not None and self.trajectories:
+            self._cut(outcomes, split, out.parent / f"{out.name}-trajectories")
         print_failed((o.segment.name, str(o.error)) for o in failed)
         return 1 if failed else 0
 
-    def _segments(self) -> list[Segment]:
+    def _cut(self, outcomes: list[Outcome], split: Split, folder: Path) -> None:
+        windows = choose_windows(
+            stretches_of(outcomes, split), self.trajectories, self.seed
+        )
+        write_trajectories(windows, folder)
+        counts = Counter((w.stretch.label, w.stretch.side) for w in windows)
+        rows = [
+            [str(label), *(str(counts[label, side]) for side in (TRAIN, VALIDATION))]
+            for label in LABELS
+            if label in {w.stretch.label for w in windows}
+        ]
+        title = f"Trajectories of {SECONDS:g} s in {folder}: {len(windows)}"
+        print_table(title, ["label", TRAIN, VALIDATION], rows)
+
+    def _segments(self) -> tuple[list[Segment], Split | None]:
+        """Returns what to retarget, and the split of the data folder it is from."""
         if self.file is not None:
-            return [self._segment_of_file(self.file)]
+            return [self._segment_of_file(self.file)], None
         if (self.start, self.end, self.fps) != (None, None, None):
             raise InputError("--start, --end and --fps need a FILE.")
         segments = read_segments(data_dir(self.data_dir))
-        if self.gait:
-            return select_segments(segments, self.source, self.gait)
-        known = {(label.source, label.gait) for label in LABELS}
-        found = select_segments(segments, self.source, ())
-        return [s for s in found if (s.source, s.gait) in known]
+        split = Split(segments, self.seed)
+        found = select_segments(segments, self.source, self.gait)
+        if not self.gait:
+            known = [str(label) for label in LABELS]
+            found = [segment for segment in found if segment.label in known]
+        return found, split
 
     def _segment_of_file(self, file: Path) -> Segment:
         if self.source is None or len(self.gait) != 1:

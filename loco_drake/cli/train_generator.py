@@ -40,10 +40,8 @@ class TrainGenerator:
     """Motions of 20 s that are made of the clips to learn from, for each gait."""
     learning_rate: float = 1e-3
     """Highest learning rate."""
-    held_out: float = 0.15
-    """Share of each gait's time that is held out, by recording, to test on."""
     seed: int = 0
-    """Of the weights, the batches and the recordings held out."""
+    """Of the weights and the batches."""
     resume: bool = False
     """Go on from the checkpoint in --out."""
     json: Path | None = None
@@ -55,10 +53,10 @@ class TrainGenerator:
         Raises:
             InputError: if an option is wrong.
         """
-        check_steps(self.steps, self.learning_rate, self.held_out)
+        check_steps(self.steps, self.learning_rate)
         if self.stitched < 1:
             raise InputError(f"--stitched must be 1 or more, not {self.stitched}.")
-        library = load_library(self.motions, self.held_out, self.seed)
+        library = load_library(self.motions)
         tokenizer = load_tokenizer(self.tokenizer)
         if not 1 <= self.books <= tokenizer.config.books:
             raise InputError(

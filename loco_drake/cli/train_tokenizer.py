@@ -21,17 +21,16 @@ class TrainTokenizer:
     """
 
     motions: Path = Path("motions/go2")
-    """Folder of Motion files, such as `retarget` writes."""
+    """Folder of Motion files, such as `retarget` writes; those for validation are held
+    out to test on."""
     out: Path = Path("runs/tokenizer")
     """Folder for the weights (tokenizer.safetensors), checkpoint and logs."""
     steps: int = 6000
     """Optimizer steps."""
     learning_rate: float = 2e-3
     """Highest learning rate."""
-    held_out: float = 0.15
-    """Share of each gait's time that is held out, by recording, to test on."""
     seed: int = 0
-    """Of the weights, the batches and the recordings held out."""
+    """Of the weights and the batches."""
     resume: bool = False
     """Go on from the checkpoint in --out."""
     json: Path | None = None
@@ -43,8 +42,8 @@ class TrainTokenizer:
         Raises:
             InputError: if an option is wrong.
         """
-        check_steps(self.steps, self.learning_rate, self.held_out)
-        library = load_library(self.motions, self.held_out, self.seed)
+        check_steps(self.steps, self.learning_rate)
+        library = load_library(self.motions)
         settings = LoopSettings(
             out=self.out,
             steps=self.steps,

@@ -7,16 +7,12 @@ from rich.console import Console
 from loco_drake.errors import InputError
 
 
-def check_steps(steps: int, learning_rate: float, held_out: float) -> None:
+def check_steps(steps: int, learning_rate: float) -> None:
     """Raises InputError unless the options of a training can be used."""
     if steps < 1:
         raise InputError(f"--steps must be 1 or more, not {steps}.")
     if not (isfinite(learning_rate) and learning_rate > 0):
         raise InputError(f"--learning-rate must be above 0, not {learning_rate:g}.")
-    if not 0 <= held_out < 1:
-        raise InputError(
-            f"--held-out must be at least 0 and below 1, not {held_out:g}."
-        )
 
 
 def print_stopped(done: int, steps: int) -> int:

@@ -81,7 +81,7 @@ class Segment:
             end=self.end,
             fps=self.fps,
         )
-        origin = {"recording": self.recording, "frames_per_second": f"{clip.fps:g}"}
+        origin = {"recording": self.recording, "recording_fps": f"{clip.fps:g}"}
         if self.animal is not None:
             origin["animal"] = self.animal
         return replace(clip, provenance={**clip.provenance, **origin})

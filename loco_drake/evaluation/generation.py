@@ -119,9 +119,7 @@ def score_generation(
                 "validation": len(of_validation),
                 "generated": sum(map(len, of_sets)),
             },
-            "classifiers": {
-                kind: _rows(found) for kind, found in recognition.items()
-            },
+            "classifiers": {kind: _rows(found) for kind, found in recognition.items()},
             "confusion": _confusion(recognition),
             **_two_sample(of_train, of_validation, join(of_sets), list(seeds)),
             **_frechet(recognition["transformer"], of_train, of_validation, of_sets),
@@ -205,7 +203,7 @@ def _frechet(
     return {
         "fid": float(np.mean(distances)),
         "fid_real_real": float(np.mean(floors)),
-        "fid_over_real_real": float(np.mean(distances) / max(np.mean(floors), 1e-9)),
+        "fid_over_real_real": float(np.mean(distances) / np.mean(floors)),
         "fid_range": [float(np.min(distances)), float(np.max(distances))],
         "fid_real_real_range": [float(np.min(floors)), float(np.max(floors))],
     }
@@ -217,9 +215,11 @@ def _nearest(
     cut_validation: Sequence[Motion],
     sets: Sequence[Sequence[Motion]],
 ) -> dict[str, Any]:
-    """Returns mean distances to the nearest stretch to train on, labels weighed alike."""
+    """Returns mean distances to the nearest stretch of training; labels weigh alike."""
 
-    def mean(motions: Sequence[Motion], *, other_subjects: bool = False) -> float | None:
+    def mean(
+        motions: Sequence[Motion], *, other_subjects: bool = False
+    ) -> float | None:
         distances = nearest_distances(motions, train, other_subjects=other_subjects)
         known = np.isfinite(distances)
         if not known.any():

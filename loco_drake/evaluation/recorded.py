@@ -6,8 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from loco_drake.datasets.segments import Segment, read_segments, select_labels
-from loco_drake.datasets.split import TRAIN, VALIDATION, Split
-from loco_drake.errors import InputError
+from loco_drake.datasets.split import VALIDATION, Split
 from loco_drake.evaluation.samples import FRAMES
 from loco_drake.gaits import LABELS
 from loco_drake.models.robots import Robot, get_robot
@@ -81,18 +80,13 @@ def retarget_recordings(
 def by_split(
     motions: Sequence[Motion], failed: dict[str, str] | None = None
 ) -> Recorded:
-    """Returns motions sorted by the side that their provenance names.
+    """Returns motions on the side of the split that their provenance names.
 
-    Raises:
-        InputError: if a motion does not say on which side of the split it is.
+    Motions that name none are for training.
     """
-    sides: dict[str, list[Motion]] = {TRAIN: [], VALIDATION: []}
-    for motion in motions:
-        side = motion.provenance.get("split")
-        if side not in sides:
-            raise InputError(
-                f"A motion of {motion.label} does not say whether it is for training "
-                f"or validation: its provenance lacks the split."
-            )
-        sides[side].append(motion)
-    return Recorded(tuple(sides[TRAIN]), tuple(sides[VALIDATION]), failed or {})
+    held = [m.provenance.get("split") == VALIDATION for m in motions]
+    return Recorded(
+        train=tuple(m for m, out in zip(motions, held, strict=True) if not out),
+        validation=tuple(m for m, out in zip(motions, held, strict=True) if out),
+        failed=failed or {},
+    )

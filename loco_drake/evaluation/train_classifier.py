@@ -70,7 +70,9 @@ def class_indices(
     labels: NDArray[np.int64], names: tuple[str, ...]
 ) -> NDArray[np.int64]:
     """Returns the place in ``names`` of each index into LABELS, -1 where it is not."""
-    place = {str(label): names.index(str(label)) for label in LABELS if str(label) in names}
+    place = {
+        str(label): names.index(str(label)) for label in LABELS if str(label) in names
+    }
     table = np.array([place.get(str(label), -1) for label in LABELS])
     return table[labels]
 

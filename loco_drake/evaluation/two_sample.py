@@ -1,8 +1,9 @@
-"""Can a classifier tell generated motion from real motion? (Lopez-Paz, Oquab 2017)
+"""Can a classifier tell generated motion from real motion?
 
-.5 means that it cannot. Both classes have equally many trajectories of each label, so
-that labels tell nothing. Accuracies are of folds that the classifier has not seen:
-all trajectories of a subject, and mirror images, are in one fold.
+The two-sample test of Lopez-Paz and Oquab 2017: .5 means that it cannot. Both classes
+have equally many trajectories of each label, so that labels tell nothing. Accuracies
+are of folds that the classifier has not seen: all trajectories of a subject, and mirror
+images, are in one fold.
 """
 
 from collections.abc import Callable
@@ -70,7 +71,9 @@ def two_sample_accuracy(
             return None
         runs.append(_cross_validate(drawn[0], drawn[1], FITS[fit], seed))
     # Every run draws anew: what is drawn again are runs, and subjects within them.
-    estimates = [accuracy(right[None], weights, subjects) for right, weights, subjects in runs]
+    estimates = [
+        accuracy(right[None], weights, subjects) for right, weights, subjects in runs
+    ]
     return Estimate(
         mean=float(np.mean([e.mean for e in estimates])),
         low=float(np.mean([e.low for e in estimates])),

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.datasets.split import VALIDATION
 from loco_drake.errors import InputError
 from loco_drake.gaits import LABELS, GaitLabel
 from loco_drake.generation.features import motion_features
@@ -23,8 +24,8 @@ class Clip:
     Attributes:
         robot: name of the robot.
         label: what it does.
-        recording: the file that the motion was recorded in; clips of one recording
-            can overlap and are never on both sides of a split.
+        recording: the recording that the motion is of, and the animal if it is known;
+            clips of one can overlap and are never on both sides of the split.
         features: see :mod:`loco_drake.generation.features`, shape (T, SIZE).
     """
 
@@ -61,19 +62,19 @@ class Library:
         return tuple(sorted({clip.robot for clip in self.train}))
 
 
-def load_library(folder: Path, held_out_fraction: float, seed: int) -> Library:
+def load_library(folder: Path) -> Library:
     """Reads every Motion file under ``folder``.
 
-    Motions whose label is not one of the fifteen are left out.
+    The split is the one that ``loco-drake retarget`` wrote into the files
+    (:mod:`loco_drake.datasets.split`); motions without one are for training. Those
+    whose label is not one of the fifteen are left out.
 
     Args:
         folder: holds ``*.npz``, in subfolders too.
-        held_out_fraction: least share of the seconds of each label to hold out, as
-            far as the label has more than one recording; 0 holds out nothing.
-        seed: which recordings are held out.
 
     Raises:
-        InputError: if there are no motions with a label, or one is unsound.
+        InputError: if there are no motions with a label to train on, one is unsound, or
+            a recording is on both sides of the split.
     """
     folder = Path(folder)
     paths = sorted(folder.rglob("*.npz")) if folder.is_dir() else []
@@ -84,51 +85,33 @@ def load_library(folder: Path, held_out_fraction: float, seed: int) -> Library:
             f"There are no Motion files (*.npz) with one of the labels "
             f"{', '.join(map(str, LABELS))} in {str(folder)!r}."
         )
-    clips = [_clip(motion, str(path)) for path, motion in motions]
-    mirrors = [_clip(motion.mirrored(), str(path)) for path, motion in motions]
-    held = choose_held_out(clips, held_out_fraction, seed)
-    return Library(
-        train=tuple(c for c in (*clips, *mirrors) if c.recording not in held),
-        held_out=tuple(c for c in clips if c.recording in held),
-    )
-
-
-def choose_held_out(clips: Sequence[Clip], fraction: float, seed: int) -> set[str]:
-    """Returns recordings to hold out, so that each label has ``fraction`` of its time.
-
-    No label loses its last recording, so that one with a single recording has none
-    held out. Labels with few recordings choose first.
-    """
-    held: set[str] = set()
-    if fraction <= 0:
-        return held
-    random = np.random.default_rng(seed)
-    frames: dict[GaitLabel, dict[str, int]] = {}
-    for clip in clips:
-        of_label = frames.setdefault(clip.label, {})
-        of_label[clip.recording] = of_label.get(clip.recording, 0) + len(clip)
-    for label in sorted(frames, key=lambda label: (len(frames[label]), label)):
-        of_label = frames[label]
-        wanted = fraction * sum(of_label.values())
-        for recording in random.permutation(sorted(of_label)):
-            if sum(of_label.get(name, 0) for name in held) >= wanted:
-                break
-            if all(_remains(f, held | {str(recording)}) for f in frames.values()):
-                held.add(str(recording))
-    return held
-
-
-def _remains(of_label: dict[str, int], held: set[str]) -> bool:
-    """Whether a label keeps a recording to learn from."""
-    return bool(set(of_label) - held)
+    train, mirrors, held_out = [], [], []
+    for path, motion in motions:
+        clip = _clip(motion, str(path))
+        if motion.provenance.get("split") == VALIDATION:
+            held_out.append(clip)
+        else:
+            train.append(clip)
+            mirrors.append(_clip(motion.mirrored(), str(path)))
+    if not train:
+        raise InputError(f"All motions in {str(folder)!r} are for validation.")
+    both = {clip.recording for clip in train} & {clip.recording for clip in held_out}
+    if both:
+        raise InputError(
+            f"Motions of {min(both)} in {str(folder)!r} are for training and for "
+            "validation: retarget all of them with the same --seed."
+        )
+    return Library(train=(*train, *mirrors), held_out=tuple(held_out))
 
 
 def _clip(motion: Motion, path: str) -> Clip:
     robot = get_robot(motion.robot)
+    origin = motion.provenance
+    recording = origin.get("animal") or origin.get("recording", path)
     return Clip(
         robot=motion.robot,
         label=motion.label,
-        recording=motion.provenance.get("file", path),
+        recording=f"{motion.source}-{recording}",
         features=motion_features(robot, motion),
     )
 

@@ -6,8 +6,7 @@ vector-quantize-pytorch. The finest books are left out at random, so that the de
 makes the best of the coarse ones alone.
 """
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +18,8 @@ from torch.nn import functional
 from vector_quantize_pytorch import ResidualVQ
 
 from loco_drake.errors import InputError
-from loco_drake.generation.determinism import single_thread
-from loco_drake.generation.features import CONTACTS, JOINTS, VELOCITY, YAW_RATE
-from loco_drake.generation.library import Clip, Library, Sampler
+from loco_drake.generation.features import CONTACTS, VELOCITY, YAW_RATE
+from loco_drake.generation.library import Library, Sampler
 from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
 from loco_drake.generation.training import LoopResult, LoopSettings, train

@@ -8,12 +8,14 @@ from pathlib import Path
 from loco_drake.datasets.segments import Segment
 from loco_drake.datasets.split import Split
 from loco_drake.errors import InputError
+from loco_drake.gaits import GaitLabel
 from loco_drake.keypoints import KeypointClip
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.motion import FPS, Motion, save_motion
 from loco_drake.parallel import map_in_workers
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import RetargetReport, retarget_clip
+from loco_drake.retargeting.trajectories import Stretch
 
 
 @dataclass(frozen=True)
@@ -104,3 +106,20 @@ def retarget_segments(
     """
     make = partial(_Writer, robot.name, Path(out_dir), split)
     return map_in_workers(make, segments, workers)
+
+
+def stretches_of(outcomes: Iterable[Outcome], split: Split) -> list[Stretch]:
+    """Returns what was retargeted, as trajectories are cut from it."""
+    return [
+        Stretch(
+            path=outcome.path,
+            label=GaitLabel(outcome.segment.source, outcome.segment.gait),
+            recording=f"{outcome.segment.source}-{outcome.segment.recording}",
+            subject=outcome.segment.subject,
+            side=split.side(outcome.segment),
+            start=outcome.segment.start / outcome.segment.fps,
+            frames=outcome.report.frames,
+        )
+        for outcome in outcomes
+        if outcome.report is not None
+    ]

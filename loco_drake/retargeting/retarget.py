@@ -23,6 +23,7 @@ from loco_drake.retargeting.scaling import (
     stance_height,
 )
 from loco_drake.retargeting.smoothing import smooth
+from loco_drake.retargeting.trunk import folded_length, raise_trunk
 from loco_drake.rotations import quat_rotate
 
 
@@ -118,7 +119,8 @@ def correct(
     """Returns targets at 50 Hz that a robot can follow, near to the formula's.
 
     Trunk and toes move smoothly, toes in contact stand still on the ground, those that
-    swing stay above it, and none is further than its leg reaches.
+    swing stay above it, none is further than its leg reaches, and the trunk never so
+    low that legs could not fold enough.
     """
     smoothing = config.smoothing
     targets = Targets(
@@ -127,16 +129,25 @@ def correct(
         pitch=smooth(formula.pitch, smoothing.base, FPS),
         p_WF=plant_feet(formula.p_WF, contacts, robot.foot_radius, smoothing.toes, FPS),
     )
-    return within_reach(targets, robot)
+    return within_reach(raise_trunk(targets, robot, FPS), robot)
 
 
 def within_reach(targets: Targets, robot: Robot) -> Targets:
     """Returns ``targets`` with toes that the joints' limits do not allow moved nearer.
 
-    A leg that is too short points at its target, which comes to lie at its end.
+    A toe nearer to its hip than the leg folds is moved down the trunk's z axis. A leg
+    that is too short points at its target, which comes to lie at its end.
     """
     p_BF = targets.p_BF
-    joints = np.clip(leg_joints(robot, p_BF), robot.joint_lower, robot.joint_upper)
+    x, y, z = np.moveaxis(p_BF - robot.p_BHip, -1, 0)
+    # In the plane of the leg, whose distance from the hip's axis is the offset.
+    square = 1.001 * folded_length(robot) ** 2 + robot.abduction_offset**2
+    drop = np.sqrt(np.maximum(square - x**2 - y**2, 0.0))
+    lowered = p_BF.copy()
+    lowered[..., 2] = np.minimum(p_BF[..., 2], robot.p_BHip[:, 2] - drop)
+    folds = x**2 + y**2 + z**2 < square
+    goal = np.where(folds[..., None], lowered, p_BF)
+    joints = np.clip(leg_joints(robot, goal), robot.joint_lower, robot.joint_upper)
     reachable = toe_positions(robot, joints)
     beyond = np.linalg.norm(reachable - p_BF, axis=-1, keepdims=True) > 1e-9
     p_WF = targets.p_WB[:, None] + quat_rotate(targets.q_WB[:, None], reachable)

@@ -38,6 +38,25 @@ def test_batch_writes_motions_json_and_table(made_data, tmp_path, capsys):
     assert all(name in printed for name in names)
 
 
+def test_files_tell_their_side_and_trajectories_are_cut(made_data, tmp_path, capsys):
+    """A pace of 4 s, 200 frames, holds two; both processes write the same split."""
+    out = tmp_path / "go2"
+    options = ("--data-dir", made_data, "--gait", "pace", "--workers", 2)
+    assert command(*options, "--out", out).run() == 0
+    motion = load_motion(out / "dog-pace-made_pace-0-240.npz")
+    assert motion.provenance["split"] == "train"  # the only one of its label
+    folder = tmp_path / "go2-trajectories"
+    names = sorted(path.name for path in folder.iterdir())
+    assert names == ["dog-pace-0.npz", "dog-pace-1.npz"]
+    cuts = [load_motion(folder / name) for name in names]
+    assert sorted(c.provenance["frames"] for c in cuts) == ["0-120", "120-240"]
+    assert {c.provenance["recording"] for c in cuts} == {"made_pace"}
+    assert "Trajectories of 2 s" in capsys.readouterr().out
+    none = ("--trajectories", 0, "--out", tmp_path / "a")
+    assert command(*options[:4], *none).run() == 0
+    assert not (tmp_path / "a-trajectories").exists()
+
+
 def test_one_file_with_a_stretch_for_the_a1(made_data, tmp_path):
     file = made_data / "dog_mann" / "keypoints" / "made_trot.txt"
     options = ("--source", "dog", "--gait", "trot", "--robot", "a1", "--start", 60)
@@ -67,6 +86,8 @@ def test_wrong_input_raises_one_sentence(made_data, tmp_path):
     wrong = {
         ("--robot", "spot", *data): "'spot'; the choices are go2, a1",
         ("--gait", "fly", *data): "'fly' of any source; the choices are pace",
+        ("--workers", "0", *data): "--workers must be 1 or more",
+        ("--trajectories", "-1", *data): "--trajectories must be 0 or more",
         ("--start", "3", *data): "need a FILE",
         (file, "--gait", "trot"): "needs its --source and one --gait",
         (file, "--source", "cat", "--gait", "trot"): "'cat'; the choices are dog",

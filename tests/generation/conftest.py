@@ -16,14 +16,20 @@ def make_synthetic():
 
 @pytest.fixture(scope="session")
 def motions(tmp_path_factory) -> Path:
-    """A folder of eight motions: two labels, two recordings of each."""
+    """A folder of eight motions: of two labels two recordings each, one held out."""
     folder = tmp_path_factory.mktemp("motions")
     for label in ("dog-trot", "dog-pace"):
         for i, (speed, turn) in enumerate(
             ((0.6, 0.0), (0.7, 0.3), (0.9, 0.0), (1.0, -0.2))
         ):
             motion = synthetic_motion(
-                label, 3.0, speed, turn, phase=0.1 * i, recording=f"{label}{i // 2}.txt"
+                label,
+                3.0,
+                speed,
+                turn,
+                phase=0.1 * i,
+                recording=f"{label}{i // 2}",
+                split=("train", "validation")[i // 2],
             )
             save_motion(motion, folder / f"{label}-{i}.npz")
     return folder

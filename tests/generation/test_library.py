@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,6 @@ from loco_drake.generation.features import SIZE
 from loco_drake.generation.library import (
     Clip,
     Sampler,
-    choose_held_out,
     load_library,
 )
 from loco_drake.motion import save_motion
@@ -17,20 +18,19 @@ def clip(label, recording, frames):
     return Clip("go2", parse_label(label), recording, np.zeros((frames, SIZE)))
 
 
-def test_recordings_are_never_on_both_sides(motions):
-    library = load_library(motions, 0.2, seed=0)
+def test_the_split_is_that_of_the_files(motions):
+    library = load_library(motions)
     train = {c.recording for c in library.train}
     held = {c.recording for c in library.held_out}
-    assert held
-    assert not train & held
+    assert train == {"dog-dog-trot0", "dog-dog-pace0"}
+    assert held == {"dog-dog-trot1", "dog-dog-pace1"}
     assert {str(label) for label in library.labels} == {"dog-pace", "dog-trot"}
     # Eight clips: each that is trained on comes with its mirror image.
     assert len(library.train) / 2 + len(library.held_out) == 8
 
 
 def test_mirror_images_turn_the_other_way(motions):
-    library = load_library(motions, 0.0, seed=0)
-    assert library.held_out == ()
+    library = load_library(motions)
     half = len(library.train) // 2
     for plain, mirror in zip(library.train[:half], library.train[half:], strict=True):
         assert plain.recording == mirror.recording
@@ -41,23 +41,26 @@ def test_mirror_images_turn_the_other_way(motions):
         )
 
 
-def test_every_label_has_its_share_held_out_and_keeps_a_recording():
-    clips = [clip("dog-pace", f"p{i}", 100) for i in range(10)]
-    clips += [clip("dog-trot", f"t{i}", 100) for i in range(2)]
-    clips += [clip("dog-gallop", "g", 100)]
-    for seed in range(5):
-        held = choose_held_out(clips, 0.25, seed)
-        assert len([r for r in held if r[0] == "p"]) == 3
-        assert len([r for r in held if r[0] == "t"]) == 1
-        assert "g" not in held
+@pytest.mark.parametrize("origin", [{"recording": "r"}, {"animal": "Horse3"}])
+def test_a_recording_on_both_sides_is_refused(tmp_path, make_synthetic, origin):
+    for i, side in enumerate(("train", "validation")):
+        provenance = {"recording": f"r{i}", **origin, "split": side}
+        motion = replace(make_synthetic(), provenance=provenance)
+        save_motion(motion, tmp_path / f"{i}.npz")
+    with pytest.raises(InputError, match=r"dog-(r|Horse3) .* for training and for"):
+        load_library(tmp_path)
+    (tmp_path / "0.npz").unlink()
+    with pytest.raises(InputError, match=r"All motions .* are for validation"):
+        load_library(tmp_path)
 
 
-def test_a_recording_of_two_labels_counts_for_both():
-    clips = [clip("dog-pace", "both", 100), clip("dog-trot", "both", 100)]
-    clips += [clip("dog-pace", "p", 100), clip("dog-trot", "t", 100)]
-    for seed in range(5):
-        held = choose_held_out(clips, 0.5, seed)
-        assert held == {"both"} or held == {"p", "t"}
+def test_motions_without_a_split_are_for_training(tmp_path, make_synthetic):
+    for i in range(2):
+        motion = replace(make_synthetic(), provenance={})
+        save_motion(motion, tmp_path / f"{i}.npz")
+    library = load_library(tmp_path)
+    assert len({clip.recording for clip in library.train}) == 2
+    assert library.held_out == ()
 
 
 def test_labels_are_drawn_by_the_square_root_of_their_time():
@@ -70,17 +73,15 @@ def test_labels_are_drawn_by_the_square_root_of_their_time():
 
 def test_a_folder_without_motions_is_refused(tmp_path, make_synthetic):
     with pytest.raises(InputError, match="no Motion files"):
-        load_library(tmp_path / "missing", 0.1, 0)
+        load_library(tmp_path / "missing")
     with pytest.raises(InputError, match="no Motion files"):
-        load_library(tmp_path, 0.1, 0)
+        load_library(tmp_path)
     (tmp_path / "bad.npz").write_bytes(b"nothing")
     with pytest.raises(InputError, match="not a Motion file"):
-        load_library(tmp_path, 0.1, 0)
+        load_library(tmp_path)
 
 
 def test_motions_without_one_of_the_labels_are_left_out(tmp_path, make_synthetic):
-    from dataclasses import replace
-
     save_motion(make_synthetic(), tmp_path / "a.npz")
     save_motion(replace(make_synthetic(), gait="turn_left"), tmp_path / "b.npz")
-    assert len(load_library(tmp_path, 0.0, 0).train) == 2
+    assert len(load_library(tmp_path).train) == 2

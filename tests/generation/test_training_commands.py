@@ -14,7 +14,6 @@ def test_from_motions_to_new_motions_by_three_commands(motions, tmp_path):
         motions=motions,
         out=tmp_path / "tokenizer",
         steps=3,
-        held_out=0.2,
         json=tmp_path / "tokenizer.json",
     )
     assert train.run() == 0
@@ -59,7 +58,6 @@ def test_from_motions_to_new_motions_by_three_commands(motions, tmp_path):
     [
         ({"steps": 0}, "--steps"),
         ({"learning_rate": float("nan")}, "--learning-rate"),
-        ({"held_out": 1.0}, "--held-out"),
         ({"resume": True}, "no tokenizer-checkpoint weights"),
     ],
 )
