@@ -37,7 +37,7 @@ class ClassifierConfig:
     """
 
     labels: tuple[str, ...]
-    frames_per_patch: int = 4
+    frames_per_patch: int = 5
     width: int = 64
     layers: int = 2
     heads: int = 4

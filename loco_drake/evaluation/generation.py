@@ -1,6 +1,5 @@
 """How good generated motion is: all figures of ``loco-drake evaluate generation``."""
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -23,18 +22,14 @@ from loco_drake.evaluation.recognition import (
 )
 from loco_drake.evaluation.recorded import Recorded
 from loco_drake.evaluation.samples import (
-    FRAMES,
-    SECONDS,
     SUMMARY,
     Samples,
     join,
     label_weights,
     make_samples,
 )
-from loco_drake.evaluation.two_sample import two_sample_accuracy
-from loco_drake.gaits import LABELS, GaitLabel
-from loco_drake.generation.generate import generate_motion, generate_motions
-from loco_drake.generation.motion_model import MotionModel
+from loco_drake.evaluation.two_sample import FOLDS, two_sample_accuracy
+from loco_drake.gaits import LABELS
 from loco_drake.models.robots import Robot
 from loco_drake.motion import Motion
 from loco_drake.retargeting.trajectories import trajectories
@@ -89,8 +84,16 @@ def score_generation(
         seeds: of the classifiers; all else that is random follows the first.
         steps: of the transformer's training.
         say: is told what goes on.
+
+    Raises:
+        InputError: if there are fewer than two such labels.
     """
     names = set(recorded.labels) & {str(m.label) for m in generated.sets[0]}
+    if len(names) < 2:
+        raise InputError(
+            "To tell gaits apart takes two labels at least, with recordings for "
+            f"training and for validation; there are {', '.join(names) or 'none'}."
+        )
     train, validation = (
         [m for m in side if str(m.label) in names]
         for side in (recorded.train, recorded.validation)
@@ -126,7 +129,12 @@ def score_generation(
             **_nearest(train, cut_train, cut_validation, sets),
             **_drift(robot, generated.long),
             **_by_label(robot, recorded, generated),
+            "reason": {},
         }
+    few = f"Fewer than {FOLDS} subjects on a side."
+    for name in ("two_sample_accuracy", "two_sample_accuracy_real_real"):
+        if figures[name] is None:
+            figures["reason"][name] = few
     return GenerationScore(figures, recognition)
 
 
@@ -273,65 +281,3 @@ def _by_label(robot: Robot, recorded: Recorded, generated: Generated) -> dict[st
         ),
         "other": {k: v for k, v in figures.items() if k not in known},
     }
-
-
-def real_time_factor(model: MotionModel, label: GaitLabel, seconds: float) -> float:
-    """Returns seconds of motion, one alone, over the seconds that writing it takes."""
-    generate_motion(model, label, 1.0, 0)  # the first call sets up torch
-    start = time.perf_counter()
-    generate_motion(model, label, seconds, 0)
-    return seconds / (time.perf_counter() - start)
-
-
-def generate_for_scoring(
-    model: MotionModel,
-    labels: Sequence[GaitLabel],
-    *,
-    count: int,
-    sets: int,
-    long: int,
-    seed: int,
-) -> Generated:
-    """Generates what :func:`score_generation` scores.
-
-    Args:
-        model: that is to be scored.
-        labels: that it knows.
-        count: trajectories of each label in a set.
-        sets: how many; all motions differ in their seeds.
-        long: motions of a minute for each label; 0 measures no drift.
-        seed: of the first motion.
-    """
-    trajectories: list[list[Motion]] = [[] for _ in range(sets)]
-    minutes = {}
-    for label in labels:
-        for number, motions in enumerate(trajectories):
-            first = seed + number * count
-            seeds = range(first, first + count)
-            # Its last frame is one more than makes 2 s of frames.
-            made = generate_motions(model, label, SECONDS, seeds)
-            motions += [motion.slice(0, FRAMES) for motion in made]
-        if long:
-            seeds = range(seed, seed + long)
-            minutes[str(label)] = generate_motions(
-                model, label, drifting.SECONDS, seeds
-            )
-    return Generated(tuple(map(tuple, trajectories)), minutes)
-
-
-def loaded_for_scoring(motions: Sequence[Motion]) -> Generated:
-    """Returns motions from anywhere, cut into trajectories, as one set.
-
-    Those of a minute or more tell the drift, too.
-
-    Raises:
-        InputError: if no motion is as long as a trajectory.
-    """
-    cuts = [part for motion in motions for part in trajectories(motion)]
-    if not cuts:
-        raise InputError(f"No motion to score is {SECONDS:g} s long or longer.")
-    long: dict[str, list[Motion]] = {}
-    for motion in motions:
-        if motion.duration >= drifting.SECONDS:
-            long.setdefault(str(motion.label), []).append(motion)
-    return Generated((tuple(cuts),), long)

@@ -36,6 +36,14 @@ from loco_drake.motion_quality import (
 
 Array = NDArray[np.float64]
 
+# Of a label without generated motion.
+NULL_FIGURES: dict[str, Any] = {
+    "stance_slip_median_mps": None,
+    "penetration_max_m": None,
+    "jerk_ratio": None,
+    "speed_error_mps": None,
+}
+
 
 @dataclass(frozen=True, eq=False)
 class Measured:

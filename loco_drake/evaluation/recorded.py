@@ -7,10 +7,11 @@ from pathlib import Path
 
 from loco_drake.datasets.segments import Segment, read_segments, select_labels
 from loco_drake.datasets.split import VALIDATION, Split
+from loco_drake.errors import InputError
 from loco_drake.evaluation.samples import FRAMES
 from loco_drake.gaits import LABELS
 from loco_drake.models.robots import Robot, get_robot
-from loco_drake.motion import Motion
+from loco_drake.motion import Motion, load_motion
 from loco_drake.parallel import map_in_workers
 from loco_drake.retargeting.batch import SegmentRetargeter
 
@@ -90,3 +91,25 @@ def by_split(
         validation=tuple(m for m, out in zip(motions, held, strict=True) if out),
         failed=failed or {},
     )
+
+
+def load_recorded(folder: Path) -> tuple[Robot, Recorded]:
+    """Reads the Motion files under ``folder`` that are of one of the fifteen labels.
+
+    Returns:
+        The robot that all are of, and its motions.
+
+    Raises:
+        InputError: if there are none, or of several robots, or one is unsound.
+    """
+    folder = Path(folder)
+    motions = [load_motion(path) for path in sorted(folder.rglob("*.npz"))]
+    motions = [motion for motion in motions if motion.label in LABELS]
+    robots = sorted({motion.robot for motion in motions})
+    if len(robots) != 1:
+        found = f"of {', '.join(robots)}" if robots else "none"
+        raise InputError(
+            f"{str(folder)!r} must hold Motion files (*.npz) of one robot with labels "
+            f"such as {LABELS[0]}; there are {found}."
+        )
+    return get_robot(robots[0]), by_split(motions)

@@ -21,8 +21,8 @@ from loco_drake.evaluation.samples import CHANNELS, Samples, label_weights
 from loco_drake.gaits import LABELS
 from loco_drake.generation.training import LoopResult, LoopSettings, train
 
-BATCH = 64
-STEPS = 500
+BATCH = 48
+STEPS = 300
 LEARNING_RATE = 1e-3
 
 

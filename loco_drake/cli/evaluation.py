@@ -1,0 +1,66 @@
+"""What the ``evaluate`` commands share."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from loco_drake.errors import InputError, check_choice
+from loco_drake.files import atomic_path
+from loco_drake.models.robots import ROBOTS
+
+
+def check_at_least(option: str, value: int, least: int) -> None:
+    """Raises InputError if ``value`` is below ``least``."""
+    if value < least:
+        name = option.replace("_", "-")
+        raise InputError(f"--{name} must be {least} or more, not {value}.")
+
+
+def of_robots(robot: str, evaluate: Callable[[str], dict[str, Any]]) -> dict[str, Any]:
+    """Returns the figures of ``robot``, or of all by name.
+
+    With "all", a robot that cannot be evaluated says why; if none can, that is an
+    error.
+
+    Args:
+        robot: a name, or "all".
+        evaluate: returns the figures of one robot.
+
+    Raises:
+        InputError: from ``evaluate``.
+    """
+    check_choice("robot", robot, (*ROBOTS, "all"))
+    if robot != "all":
+        return {"robot": robot, **evaluate(robot)}
+    results: dict[str, dict[str, Any]] = {}
+    for name in ROBOTS:
+        try:
+            results[name] = evaluate(name)
+        except InputError as error:
+            results[name] = {"reason": str(error)}
+    if all(set(result) == {"reason"} for result in results.values()):
+        raise InputError(str(next(iter(results.values()))["reason"]))
+    return {"robots": results}
+
+
+def robot_names(result: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """Returns name and figures of each robot in what :func:`of_robots` returns."""
+    if "robots" in result:
+        return list(result["robots"].items())
+    return [(result["robot"], result)]
+
+
+def estimate_text(estimate: dict[str, float] | None) -> str:
+    """Returns an estimate as ``.950 [.910, .980]``."""
+    if estimate is None:
+        return "-"
+    mean, low, high = (estimate[key] for key in ("mean", "low", "high"))
+    return f"{mean:.3f} [{low:.3f}, {high:.3f}]"
+
+
+def write_figure(figure: Figure, path: Path) -> None:
+    """Writes a picture, wholly or not at all."""
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=120)
