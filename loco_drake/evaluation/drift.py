@@ -42,7 +42,7 @@ RESOLUTION = {
 }
 
 
-def drift(robot: Robot, motions: Sequence[Motion]) -> dict[str, dict[str, float]]:
+def drift(robot: Robot, motions: Sequence[Motion]) -> dict[str, Any]:
     """Returns the drift of each figure, of motions of one gait; see above.
 
     Args:
@@ -50,8 +50,8 @@ def drift(robot: Robot, motions: Sequence[Motion]) -> dict[str, dict[str, float]
         motions: two or more of different seeds, longer than 2 WINDOW.
 
     Returns:
-        For each figure its means in the first and last WINDOW seconds, change,
-        tolerance, and drift. A figure that two motions or more do not have in their
+        For each figure its means in the first and last WINDOW seconds, the share of
+        motions that lost it, change, tolerance, and drift. A figure that two motions or more do not have in their
         first window, such as a stride period of a robot that stands, is left out.
     """
     windows = [round(WINDOW * motion.fps) for motion in motions]
@@ -68,13 +68,14 @@ def drift(robot: Robot, motions: Sequence[Motion]) -> dict[str, dict[str, float]
         begin, end = first[known, column], last[known, column]
         if len(begin) < 2:
             continue
-        end = np.where(np.isnan(end), 0.0, end)
+        lost = np.isnan(end)
         apart = np.abs(begin[:, None] - begin)[np.triu_indices(len(begin), k=1)]
         tolerance = max(resolution, float(np.quantile(apart, 0.95)))
-        change = float(np.median(np.abs(end - begin)))
+        change = float(np.median(np.abs(np.where(lost, 0.0, end) - begin)))
         result[name] = {
             "first": float(begin.mean()),
-            "last": float(end.mean()),
+            "last": None if lost.all() else float(end[~lost].mean()),
+            "lost": float(lost.mean()),
             "change": change,
             "tolerance": tolerance,
             "drift": change / tolerance,
@@ -82,7 +83,7 @@ def drift(robot: Robot, motions: Sequence[Motion]) -> dict[str, dict[str, float]
     return result
 
 
-def worst(drifts: dict[str, dict[str, dict[str, float]]]) -> dict[str, Any] | None:
+def worst(drifts: dict[str, dict[str, Any]]) -> dict[str, Any] | None:
     """Returns label, figure and drift of the worst; None if nothing was measured.
 
     Args:

@@ -113,7 +113,7 @@ def score_generation(
             ("linear", LinearRecognizer),
         ):
             recognition[kind] = recognize(
-                fit, of_train, of_validation, of_sets, seeds, say
+                fit, of_train, of_validation, of_sets, seeds, _prefix(kind, say)
             )
         say("Comparing real with generated motion")
         figures: dict[str, Any] = {
@@ -146,6 +146,10 @@ def _samples_of_sets(robot: Robot, sets: Sequence[Sequence[Motion]]) -> list[Sam
         joined[np.arange(end - len(each), end)]
         for each, end in zip(sets, ends, strict=True)
     ]
+
+
+def _prefix(kind: str, say: Say) -> Say:
+    return lambda text: say(f"{kind} classifier, {text}")
 
 
 def _rows(recognition: Recognition) -> dict[str, Any]:

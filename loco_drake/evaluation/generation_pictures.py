@@ -37,10 +37,11 @@ _TITLES = {
 def confusion_figure(recognition: Recognition, title: str) -> Figure:
     """Returns three confusion matrices: what each gait (row) was taken for."""
     names = [str(LABELS[label]) for label in recognition.labels]
-    figure = Figure(figsize=(15, 5.6), layout="constrained")
+    figure = Figure(figsize=(15, 6), layout="constrained")
     figure.suptitle(title)
+    columns = figure.subplots(1, len(_TITLES))
     for column, (row, what) in enumerate(_TITLES.items()):
-        axes = figure.add_subplot(1, 3, column + 1)
+        axes = columns[column]
         matrix = recognition.confusion[row]
         axes.imshow(matrix, vmin=0, vmax=1, cmap="Blues")
         for (i, j), share in np.ndenumerate(matrix):
@@ -91,7 +92,7 @@ def motion_figure(
         for label in LABELS
         if str(label) in first_recorded and str(label) in first_generated
     ]
-    figure = Figure(figsize=(14, 2.2 * len(names)), layout="constrained")
+    figure = Figure(figsize=(14, 1.3 * len(names)), layout="constrained")
     axes = figure.subplots(len(names), 2, squeeze=False)
     for row, name in zip(axes, names, strict=True):
         for cell, what, motion in (
@@ -108,7 +109,7 @@ def _strip(axes: Axes, robot: Robot, motion: Motion) -> None:
     frames = np.linspace(0, STRIP_SECONDS * motion.fps, POSES).round().astype(int)
     frames = np.minimum(frames, len(motion) - 1)
     # A leg whose calf has no length ends at its knee.
-    to_knee = replace(robot, calf_length=np.zeros(4))
+    to_knee = replace(robot, calf_length=0.0)
     hips = np.broadcast_to(robot.p_BHip, (len(motion), 4, 3))
     legs = [
         _seen(motion, points)[frames]

@@ -156,17 +156,17 @@ def recognize(
     }
     of_recordings = []
     for run, seed in enumerate(seeds):
-        say(f"Run {run + 1} of {len(seeds)}: learning from recordings")
+        say(f"run {run + 1} of {len(seeds)}: learning from recordings")
         recognizer = fit(train, seed)
         of_recordings.append(recognizer)
         found["real_to_real"].append(recognizer(validation))
         found["real_to_generated"].append(recognizer(everything))
-        say(f"Run {run + 1} of {len(seeds)}: learning from generated motion")
+        say(f"run {run + 1} of {len(seeds)}: learning from generated motion")
         own = generated[run % len(generated)]
         found["generated_to_real"].append(fit(own, seed)(validation))
         few = choose_per_label(own, counts, np.random.default_rng(seed))
         if len(few) < len(own):
-            say(f"Run {run + 1} of {len(seeds)}: ... of as many trajectories")
+            say(f"run {run + 1} of {len(seeds)}: ... of as many trajectories")
             found["generated_to_real_matched"].append(fit(few, seed)(validation))
         else:
             found["generated_to_real_matched"].append(found["generated_to_real"][-1])
