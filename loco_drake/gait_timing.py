@@ -74,7 +74,7 @@ class Track:
 
 @dataclass(frozen=True)
 class GaitTiming:
-    """The rhythm of a clip of at least three strides; definitions above.
+    """The rhythm of a clip; definitions above.
 
     Attributes:
         stride_period: s.
@@ -117,18 +117,18 @@ def motion_track(motion: Motion, robot: Robot) -> Track:
     )
 
 
-def gait_timing(track: Track) -> GaitTiming | None:
-    """Returns the rhythm of a track, None if it holds fewer than three strides."""
-    period = stride_period(track)
+def gait_timing(track: Track, strides: int = MIN_STRIDES) -> GaitTiming | None:
+    """Returns the rhythm of a track, None if it holds fewer than ``strides``."""
+    period = stride_period(track, strides)
     if period is None:
         return None
     return GaitTiming(period, phase_lags(track, period), duty_factors(track, period))
 
 
-def stride_period(track: Track) -> float | None:
-    """Returns the stride period in s, None without three strides of one rhythm."""
+def stride_period(track: Track, strides: int = MIN_STRIDES) -> float | None:
+    """Returns the stride period in s, None without ``strides`` of one rhythm."""
     signals = track.fore_aft
-    lags = (len(signals) - 1) // MIN_STRIDES
+    lags = (len(signals) - 1) // strides
     correlation = np.array([_correlation(signals, lag) for lag in range(lags + 2)])
     inner = correlation[1:-1]
     peaks = 1 + np.flatnonzero((inner > correlation[:-2]) & (inner >= correlation[2:]))

@@ -10,7 +10,12 @@ from rich.progress import Progress
 
 from loco_drake.cli.output import print_failed, print_table, write_json
 from loco_drake.datasets.registry import data_dir, read_clip
-from loco_drake.datasets.segments import Segment, read_segments, select_segments
+from loco_drake.datasets.segments import (
+    Segment,
+    one_format,
+    read_segments,
+    select_segments,
+)
 from loco_drake.datasets.split import TRAIN, VALIDATION, Split
 from loco_drake.errors import InputError
 from loco_drake.gaits import LABELS
@@ -113,7 +118,7 @@ class Retarget:
             return [self._segment_of_file(self.file)], None
         if (self.start, self.end, self.fps) != (None, None, None):
             raise InputError("--start, --end and --fps need a FILE.")
-        segments = read_segments(data_dir(self.data_dir))
+        segments = one_format(read_segments(data_dir(self.data_dir)))
         split = Split(segments, self.seed)
         found = select_segments(segments, self.source, self.gait)
         if not self.gait:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from loco_drake.datasets.normalize import check_range, start_along_x
 from loco_drake.datasets.simulated import read_points, trunk_ends
 from loco_drake.errors import InputError
+from loco_drake.intervals import intervals
 from loco_drake.keypoints import KeypointClip
 
 Array = NDArray[np.float64]
@@ -130,10 +131,9 @@ def _still(feet: Array) -> Bools:
 
 def _whole_runs(flags: Bools) -> list[int]:
     """Returns lengths of the runs of True in the columns that no end of them cuts."""
-    lengths: list[int] = []
-    for column in flags.T:
-        edges = np.flatnonzero(np.diff(column.astype(np.int8)))
-        opens = edges[:-1][column[edges[:-1] + 1]]
-        closes = edges[1:][column[edges[:-1] + 1]]
-        lengths.extend(int(n) for n in closes - opens)
-    return lengths
+    return [
+        end - start
+        for column in flags.T
+        for start, end in intervals(column)
+        if start > 0 and end < len(column)
+    ]

@@ -36,17 +36,17 @@ def check_steps(points: Array, max_step: float, path: Path, what: str) -> None:
     Args:
         points: in m, shape (T, N, 3).
         max_step: more than any true point does, so that lines are missing or shuffled.
-        path: the file, one frame a line, for the message.
+        path: the file, for the message.
         what: its format, for the message: "a dog keypoint file".
 
     Raises:
-        InputError: naming the first line after a jump.
+        InputError: naming the first frame after a jump.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=-1).max(axis=-1, initial=0.0)
     if (steps > max_step).any():
-        line = int(np.argmax(steps > max_step)) + 2
+        frame = int(np.argmax(steps > max_step)) + 1
         raise InputError(
-            f"{path} is not {what}: at line {line} a point jumps by more than "
+            f"{path} is not {what}: at frame {frame} a point jumps by more than "
             f"{max_step} m (are lines missing or out of order?)."
         )
 

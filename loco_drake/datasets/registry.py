@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 from loco_drake.datasets.dog import read_dog
+from loco_drake.datasets.horse import read_horse
 from loco_drake.datasets.mpc import read_mpc
 from loco_drake.datasets.solo8 import read_solo8
 from loco_drake.errors import InputError, check_choice
@@ -59,6 +60,13 @@ DATASETS = {
             licence="CC BY-NC 4.0",
             attribution="Zhang, Starke, Komura, Saito 2018 (MANN, AI4Animation)",
             read=read_dog,
+        ),
+        Dataset(
+            source="horse",
+            folder="horse_vhdc",
+            licence="CC BY-SA 4.0 (3.0 by another catalogue)",
+            attribution="Vienna Horse Data Collection (VHDC), Vetmeduni Vienna / Bonn",
+            read=read_horse,
         ),
         Dataset(
             source="mpc",

@@ -38,8 +38,12 @@ class Segment:
 
     @property
     def name(self) -> str:
-        """Names the segment and what is made of it: ``dog-trot-dog_walk04-232-545``."""
-        return f"{self.label}-{self.path.stem}-{self.start}-{self.end}"
+        """Names the segment and what is made of it: ``dog-trot-dog_walk04-232-545``.
+
+        Recordings can be there in two formats; that of other files than .txt is named.
+        """
+        kind = "" if self.path.suffix == ".txt" else self.path.suffix.replace(".", "-")
+        return f"{self.label}-{self.path.stem}{kind}-{self.start}-{self.end}"
 
     @property
     def label(self) -> str:
@@ -130,6 +134,25 @@ def read_segments(data_dir: Path) -> list[Segment]:
             )
         segments.append(segment)
     return segments
+
+
+def one_format(segments: Iterable[Segment]) -> list[Segment]:
+    """Returns the segments without those of recordings that are there as measured, too.
+
+    The horses' ``.csv`` files are as they were measured; others have made ``.txt``
+    files of some of them, which hold the same strides again.
+    """
+    segments = list(segments)
+    measured = {(s.source, s.recording) for s in segments if _is_measured(s)}
+    return [
+        segment
+        for segment in segments
+        if _is_measured(segment) or (segment.source, segment.recording) not in measured
+    ]
+
+
+def _is_measured(segment: Segment) -> bool:
+    return segment.path.suffix == ".csv"
 
 
 def select_labels(segments: Iterable[Segment], labels: Iterable[str]) -> list[Segment]:

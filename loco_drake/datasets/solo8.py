@@ -1,9 +1,9 @@
-"""The robot Solo8, simulated, of CASSI (Li, Blaes, Kolev, Vlastelica, Frey, Martius,
-ICRA 2023).
+"""The simulated robot Solo8 of CASSI.
 
-A file holds 27 columns: centre of the trunk; hips FL, FR, RL, RR; feet FL, FR, RL, RR;
-50 frames a second. A foot is the centre of its ball. Each run begins with a drop from
-.34 m, in which nothing of a gait is seen.
+CASSI: Li, Blaes, Kolev, Vlastelica, Frey, Martius (ICRA 2023). A file holds 27 columns:
+centre of the trunk; hips FL, FR, RL, RR; feet FL, FR, RL, RR; 50 frames a second. A
+foot is the centre of its ball. Each run begins with a drop from .34 m, in which nothing
+of a gait is seen.
 """
 
 from pathlib import Path

@@ -8,7 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from loco_drake.gait_timing import GaitTiming
+from loco_drake.gait_timing import GaitTiming, Track, gait_timing
+
+# The animal decides whether there are enough strides: a robot's motion can end a frame
+# before its clip, and a slower robot makes fewer strides.
+_ROBOT_STRIDES = 2
 
 
 @dataclass(frozen=True)
@@ -28,29 +32,32 @@ class GaitFidelity:
     duty_factor_error: float
 
 
-# Of a robot that has no rhythm, or fewer than three strides, where the animal has them.
+# Of a robot that has no rhythm, or fewer than two strides, where the animal has three.
 NO_RHYTHM = GaitFidelity(
     stride_period_error=1.0, phase_lag_error=0.5, duty_factor_error=1.0
 )
 
 
-def gait_fidelity(
-    source: GaitTiming | None, robot: GaitTiming | None
-) -> GaitFidelity | None:
+def gait_fidelity(source: Track, robot: Track) -> GaitFidelity | None:
     """Returns how far the robot's rhythm is off.
 
     Args:
-        source: rhythm of the animal.
-        robot: rhythm of the robot in the motion made of it.
+        source: of the animal.
+        robot: of the motion made of it.
 
     Returns:
-        None if the animal's clip holds fewer than three strides; :data:`NO_RHYTHM` if
-        only the robot's does.
+        None if the animal makes fewer than three strides; :data:`NO_RHYTHM` if the
+        robot then makes fewer than two.
     """
-    if source is None:
+    own = gait_timing(source)
+    if own is None:
         return None
-    if robot is None:
-        return NO_RHYTHM
+    made = gait_timing(robot, _ROBOT_STRIDES)
+    return NO_RHYTHM if made is None else timing_errors(own, made)
+
+
+def timing_errors(source: GaitTiming, robot: GaitTiming) -> GaitFidelity:
+    """Returns how far the timing of a robot is off that of an animal."""
     late = robot.phase_lags - source.phase_lags
     between = (late[:, None] - late + 0.5) % 1.0 - 0.5
     duty = np.abs(robot.duty_factors - source.duty_factors)

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from loco_drake.datasets.segments import Segment
 from loco_drake.evaluation.gait_fidelity import GaitFidelity, gait_fidelity
-from loco_drake.gait_timing import clip_track, gait_timing, motion_track
+from loco_drake.gait_timing import clip_track, motion_track
 from loco_drake.gaits import LABELS
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.motion_quality import stance_slip_speeds, toe_trajectories
@@ -93,9 +93,7 @@ class _Scorer:
             segment=segment,
             report=report,
             slip_speeds=stance_slip_speeds(p_WF, robot.foot_radius, motion.fps),
-            fidelity=gait_fidelity(
-                gait_timing(track), gait_timing(motion_track(motion, robot))
-            ),
+            fidelity=gait_fidelity(track, motion_track(motion, robot)),
         )
 
 

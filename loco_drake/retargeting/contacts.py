@@ -1,10 +1,9 @@
 """Which toes of a recording are on the ground."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.intervals import intervals
 from loco_drake.keypoints import KeypointClip
 from loco_drake.retargeting.config import ContactConfig
 from loco_drake.retargeting.smoothing import smooth
@@ -49,13 +48,6 @@ def detect_contacts(clip: KeypointClip, height: float, config: ContactConfig) ->
         shortest = round(config.shortest_stance * clip.fps)
         contacts[:, leg] = _without_short(filled, shortest)
     return contacts
-
-
-def intervals(flags: Bools) -> Iterator[tuple[int, int]]:
-    """Yields first frame and frame after the last of each run of True in ``flags``."""
-    edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
-    for start, end in edges.reshape(-1, 2):
-        yield int(start), int(end)
 
 
 def resample_contacts(

@@ -7,9 +7,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from loco_drake.gait_timing import clip_track, gait_timing
+from loco_drake.intervals import intervals
 from loco_drake.keypoints import LEGS, KeypointClip
 from loco_drake.retargeting.config import load_config
-from loco_drake.retargeting.contacts import detect_contacts, intervals
+from loco_drake.retargeting.contacts import detect_contacts
 from loco_drake.retargeting.scaling import stance_height
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ Ry(theta):
     psi      = atan2(w_y - h_y, w_x - h_x)                      heading
     theta    = -atan2(w_z - h_z, hypot(w_x - h_x, w_y - h_y))   pitch, nose down > 0
     p_WB     = alpha (w + h) / 2 + (0, 0, base_height_offset)   roll is 0
-    p_WA     = w + front_hip H d +- hip_spread H s              the animal's virtual hip,
-               h + rear_hip H d +- hip_spread H s                 front and rear
+    p_WA     = w + front_hip H d +- hip_spread H s              the animal's virtual
+               h + rear_hip H d +- hip_spread H s               hips, front and rear
     p_WV     = p_WB + R (p_BHip + (0, abduction offset, 0))
     p_WF_xy  = (p_WV + alpha |p_WT - p_WA| u)_xy                T the animal's toe
     p_WF_z   = foot_radius + swing_height alpha max(T_z, 0)     the toe's height is kept

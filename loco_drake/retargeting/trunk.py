@@ -19,7 +19,7 @@ RAMP_SECONDS = 0.14
 
 
 def folded_length(robot: Robot) -> float:
-    """Returns the least distance in m from thigh joint to toe: the calf at its limit."""
+    """Returns thigh joint to toe in m with the calf at its limit: as near as can be."""
     l1, l2 = robot.thigh_length, robot.calf_length
     square = l1**2 + l2**2 + 2 * l1 * l2 * np.cos(robot.joint_lower[2])
     return float(np.sqrt(square))

@@ -95,7 +95,7 @@ REASONS = {
     "column missing": "line 1 has 80 ",
     "blank line": "line 10 has 1 ",
     "shuffled": "out of order",
-    "centimetres": "are these metres",
+    "centimetres": "is the unit of length",
     "binary": "not plain text",
     "zeros": "not plain text",
     "utf-16": "not plain text",

@@ -1,6 +1,13 @@
+from pathlib import Path
+
 import pytest
 
-from loco_drake.datasets.segments import read_segments, select_segments
+from loco_drake.datasets.segments import (
+    Segment,
+    one_format,
+    read_segments,
+    select_segments,
+)
 from loco_drake.errors import InputError
 
 HEADER = "dataset,file,gait,start_frame,end_frame,fps,mean_speed_mps,notes\n"
@@ -62,3 +69,11 @@ def test_selection_by_source_and_gait(made_data):
 def test_real_table_lists_the_dog_gaits(real_data):
     gaits = {segment.gait for segment in read_segments(real_data)}
     assert {"pace", "trot", "gallop"} <= gaits
+
+
+def test_a_recording_in_two_formats_counts_once():
+    """The .csv of two files is kept; a recording with a .txt alone keeps that."""
+    files = ["a/Horse1_M1_walk1.txt", "b/Horse1_M1_walk1.csv", "a/Horse2_M1_walk1.txt"]
+    segments = [Segment("horse", Path(f), "walk", 0, 600, 60.0) for f in files]
+    assert len({segment.name for segment in segments}) == 3
+    assert one_format(segments) == segments[1:]

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from loco_drake.datasets.segments import Segment, read_segments
+from loco_drake.datasets.segments import Segment, one_format, read_segments
 from loco_drake.datasets.split import SHARE, TRAIN, VALIDATION, Split
 from loco_drake.gaits import LABELS
 
@@ -77,7 +77,7 @@ def test_provenance_tells_recording_animal_and_rate(made_data):
 
 def test_real_recordings_are_split_evenly(real_data):
     """Every label has a fifth to two fifths of its time in validation."""
-    segments = read_segments(real_data)
+    segments = one_format(read_segments(real_data))
     for seed in range(3):
         split = Split(segments, seed)
         for label in LABELS:

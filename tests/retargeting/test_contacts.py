@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
+from loco_drake.intervals import intervals
 from loco_drake.keypoints import KeypointClip
 from loco_drake.retargeting.config import ContactConfig, load_config
 from loco_drake.retargeting.contacts import (
     detect_contacts,
-    intervals,
     resample_contacts,
 )
 from tests.synthetic import FPS, STANCE_HEIGHT, make_dog
