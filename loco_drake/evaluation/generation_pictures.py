@@ -37,7 +37,7 @@ _TITLES = {
 def confusion_figure(recognition: Recognition, title: str) -> Figure:
     """Returns three confusion matrices: what each gait (row) was taken for."""
     names = [str(LABELS[label]) for label in recognition.labels]
-    figure = Figure(figsize=(15, 6), layout="constrained")
+    figure = Figure(figsize=(15, 6.6), layout="constrained")
     figure.suptitle(title)
     columns = figure.subplots(1, len(_TITLES))
     for column, (row, what) in enumerate(_TITLES.items()):
