@@ -89,6 +89,7 @@ def test_a_lost_rhythm_is_drift():
             replace(
                 moving,
                 base_position=moving.base_position[still],
+                base_quaternion=moving.base_quaternion[still],
                 joint_positions=moving.joint_positions[still],
             )
         )
