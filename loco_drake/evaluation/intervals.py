@@ -61,11 +61,12 @@ def accuracy(
     member[np.arange(len(weights)), place] = weights
     right, weight = correct @ member, member.sum(axis=0)
     random = np.random.default_rng(seed)
-    drawn = np.empty(RESAMPLES)
-    for i in range(RESAMPLES):
-        runs = random.integers(len(correct), size=len(correct))
-        chosen = random.integers(len(names), size=len(names))
-        drawn[i] = right[np.ix_(runs, chosen)].sum() / weight[chosen].sum() / len(runs)
+    # How often each run and each group is drawn, (RESAMPLES, runs) and (.., groups).
+    runs, times = (
+        random.multinomial(size, np.full(size, 1 / size), RESAMPLES)
+        for size in right.shape
+    )
+    drawn = (runs @ right * times).sum(axis=1) / (times @ weight) / len(right)
     low, high = np.percentile(drawn, (2.5, 97.5))
     wilson_low, wilson_high = wilson(mean, float(1.0 / (weights**2).sum()))
     return Estimate(mean, min(float(low), wilson_low), max(float(high), wilson_high))
