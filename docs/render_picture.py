@@ -47,9 +47,14 @@ def main(
     recorder.diagram.ForcedPublish(recorder.context)
     x, y, _ = rollout.state[-1, 4:7]
     meshcat.SetCameraPose([x + 0.75, y - 0.95, 0.5], [x + 0.02, y, 0.2])
+    take_picture(meshcat.StaticHtml(), png, size)
+
+
+def take_picture(html: str, png: Path, size: tuple[int, int]) -> None:
+    """Writes a picture of a static page of Meshcat, ``size`` pixels wide and high."""
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "page.html"
-        page.write_text(meshcat.StaticHtml())
+        page.write_text(html)
         png.parent.mkdir(parents=True, exist_ok=True)
         subprocess.run(
             [

@@ -11,12 +11,12 @@ from loco_drake.rotations import quat_rotate
 
 from .plan import standing_plan
 
-# The colours of the paper's Figure 1.
+# Those of the paper's Figure 1.
 _FRONT = Rgba(0.1, 0.3, 0.9)
 _REAR = Rgba(0.9, 0.1, 0.1)
 _TRUNK = Rgba(0.1, 0.7, 0.2)
-_NAMES = ("FL_toe", "FR_toe", "RL_toe", "RR_toe", "withers", "hip")
-_COLORS = (_FRONT, _FRONT, _REAR, _REAR, _TRUNK, _TRUNK)
+NAMES = ("FL_toe", "FR_toe", "RL_toe", "RR_toe", "withers", "hip")
+COLORS = (_FRONT, _FRONT, _REAR, _REAR, _TRUNK, _TRUNK)
 
 
 class KeypointVisualizer(LeafSystem):
@@ -47,11 +47,11 @@ class KeypointVisualizer(LeafSystem):
     ) -> None:
         super().__init__()
         self._meshcat = meshcat
-        self._paths = [f"{path}/{name}" for name in _NAMES]
+        self._paths = [f"{path}/{name}" for name in NAMES]
         x = np.abs(robot.p_BHip[:, 0]).mean()
         self._p_BK = np.array([[x, 0.0, 0.06], [-x, 0.0, 0.06]])
         self._plan = self.DeclareAbstractInputPort("plan", Value(standing_plan(robot)))
-        for name, color in zip(self._paths, _COLORS, strict=True):
+        for name, color in zip(self._paths, COLORS, strict=True):
             meshcat.SetObject(name, Sphere(robot.foot_radius), color)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._publish)
         self.DeclareForcedPublishEvent(self._publish)

@@ -62,21 +62,37 @@ def make_dog(gait: str = "pace", seconds: float = 4.0) -> SyntheticDog:
     zero, one = np.zeros_like(time), np.ones_like(time)
     withers = np.stack((middle + half, zero, WITHERS_HEIGHT * one), axis=-1)
     hip = np.stack((middle - half, zero, HIP_HEIGHT * one), axis=-1)
+    toes, contacts = make_steps(made, time, (half, -half - 0.03), LATERAL, SWING_HEIGHT)
+    return SyntheticDog(withers, hip, toes, contacts, made)
+
+
+def make_steps(
+    gait: Gait, time: Array, ahead: tuple[float, float], lateral: float, lift: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Returns toes (T, 4, 3) of an animal at constant speed, and their contacts.
+
+    Args:
+        gait: how it steps; its middle is at x = speed * time.
+        time: s, shape (T,).
+        ahead: x of front and rear toes in mid-stance from that middle, m.
+        lateral: distance of the toes from the midline, m.
+        lift: height of the toes in mid-swing, m; 0 in stance.
+    """
     toes = np.empty((len(time), 4, 3))
     contacts = np.empty((len(time), 4), dtype=bool)
-    for leg, lag in enumerate(made.phase):
-        ahead = half if leg < 2 else -half - 0.03
-        stride, phase = np.divmod(time / made.period - lag, 1.0)
-        contacts[:, leg] = phase < made.duty
+    for leg, lag in enumerate(gait.phase):
+        stride, phase = np.divmod(time / gait.period - lag, 1.0)
+        contacts[:, leg] = phase < gait.duty
         # A foot stands where its trunk point passes half a contact after touchdown.
-        touchdown = (stride + lag) * made.period
-        stands = made.speed * (touchdown + made.duty * made.period / 2) + ahead
-        s = np.clip((phase - made.duty) / (1 - made.duty), 0.0, 1.0)
+        touchdown = (stride + lag) * gait.period
+        middle = touchdown + gait.duty * gait.period / 2
+        s = np.clip((phase - gait.duty) / (1 - gait.duty), 0.0, 1.0)
         advance = s**3 * (10 - 15 * s + 6 * s**2)
-        toes[:, leg, 0] = stands + advance * made.speed * made.period
-        toes[:, leg, 1] = LATERAL if leg % 2 == 0 else -LATERAL
-        toes[:, leg, 2] = 64 * SWING_HEIGHT * (s * (1 - s)) ** 3
-    return SyntheticDog(withers, hip, toes, contacts, made)
+        stands = gait.speed * middle + ahead[leg // 2]
+        toes[:, leg, 0] = stands + advance * gait.speed * gait.period
+        toes[:, leg, 1] = lateral if leg % 2 == 0 else -lateral
+        toes[:, leg, 2] = 64 * lift * (s * (1 - s)) ** 3
+    return toes, contacts
 
 
 def write_dog_recording(
@@ -91,19 +107,33 @@ def write_dog_recording(
         heading: direction of the run in the file, rad; the start is off the origin too.
     """
     dog = make_dog(gait, seconds)
+    x, y, z = np.moveaxis(place(dog_points(dog), heading), -1, 0)
+    save_points(path, np.stack((x, z, -y), axis=-1))
+    return dog
+
+
+def dog_points(dog: SyntheticDog) -> Array:
+    """Returns the 27 points of the skeleton, Z up, shape (T, 27, 3)."""
     points = np.empty((len(dog.hip), 27, 3))
     points[:, :3] = dog.hip[:, None]
     points[:, 3:10] = points[:, 11:15] = points[:, 24:27] = dog.withers[:, None]
     points[:, 16:19] = points[:, 20:23] = dog.hip[:, None]
     raised = dog.toes + MARKER_HEIGHTS[:, None] * np.array([0.0, 0.0, 1.0])
     points[:, [10, 15, 19, 23]] = raised
+    return points
+
+
+def place(points: Array, heading: float) -> Array:
+    """Returns points (..., 3) turned by ``heading`` rad and moved off the origin."""
     c, s = np.cos(heading), np.sin(heading)
-    x = c * points[..., 0] - s * points[..., 1] + 1.5
-    y = s * points[..., 0] + c * points[..., 1] - 0.5
-    y_up = np.stack((x, points[..., 2], -y), axis=-1)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return points @ R.T + np.array([1.5, -0.5, 0.0])
+
+
+def save_points(path: Path, points: Array) -> None:
+    """Writes points (T, N, 3) as comma-separated rows without a header."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    np.savetxt(path, y_up.reshape(len(y_up), 81), fmt="%.6f", delimiter=",")
-    return dog
+    np.savetxt(path, points.reshape(len(points), -1), fmt="%.6f", delimiter=",")
 
 
 def write_data_folder(

@@ -103,9 +103,16 @@ def read_bvh(path: Path, what: str) -> Bvh:
         raise InputError(f"{path} is not {what}: its HIERARCHY is damaged.") from None
     frames = _header_value(lines[head + 1], "Frames", path, what)
     step = _header_value(lines[head + 2], "Frame Time", path, what)
-    rows = [",".join(line.split()) for line in lines[head + 3 :]]
     columns = sum(len(joint.channels) for joint in joints)
-    motion = parse_numbers(rows, head + 4, columns, path, what)
+    rows = [line.split() for line in lines[head + 3 :]]
+    for number, row in enumerate(rows, start=head + 4):
+        if len(row) != columns:
+            raise InputError(
+                f"{path} is not {what}: line {number} has {len(row)} numbers instead "
+                f"of {columns}."
+            )
+    joined = [",".join(row) for row in rows]
+    motion = parse_numbers(joined, head + 4, columns, path, what)
     if len(motion) != frames:
         raise InputError(
             f"{path} is not {what}: it holds {len(motion)} frames but says {frames:g}."

@@ -73,5 +73,5 @@ def usable_stretch(
 
 def _all_seen(points: Array) -> NDArray[np.bool_]:
     """Returns in which frames (T,) of ``points`` (T, ...) nothing is missing."""
-    seen: NDArray[np.bool_] = np.isfinite(points.reshape(len(points), -1)).all(axis=1)
-    return seen
+    flat = points.reshape(len(points), -1)
+    return np.asarray(np.isfinite(flat).all(axis=1), dtype=np.bool_)

@@ -36,6 +36,7 @@ class RetargetReport:
         frames_per_second: frames of the motion per second of computing.
         toe_error_rmse_m: of the toes against the targets that the solver was given.
         correction_rmse_m: of those targets against the paper's formula.
+        trunk_correction_rmse_m: of the trunk's position against the paper's formula.
         stance_slip_median_mps: None if no toe ever stands.
         penetration_max_m: deepest.
         joint_limit_violations: number of joint angles.
@@ -47,6 +48,7 @@ class RetargetReport:
     frames_per_second: float
     toe_error_rmse_m: float
     correction_rmse_m: float
+    trunk_correction_rmse_m: float
     stance_slip_median_mps: float | None
     penetration_max_m: float
     joint_limit_violations: int
@@ -99,6 +101,7 @@ def retarget_clip(
         frames_per_second=len(motion) / seconds,
         toe_error_rmse_m=quality.distance_rmse(p_WF, targets.p_WF),
         correction_rmse_m=quality.distance_rmse(targets.p_WF, formula.p_WF),
+        trunk_correction_rmse_m=quality.distance_rmse(targets.p_WB, formula.p_WB),
         stance_slip_median_mps=quality.stance_slip_median(p_WF, robot.foot_radius, FPS),
         penetration_max_m=quality.penetration_max(p_WF, robot.foot_radius),
         joint_limit_violations=quality.joint_limit_violations(joints, robot),
@@ -119,8 +122,8 @@ def correct(
     """Returns targets at 50 Hz that a robot can follow, near to the formula's.
 
     Trunk and toes move smoothly, toes in contact stand still on the ground, those that
-    swing stay above it, none is further than its leg reaches, and the trunk never so
-    low that legs could not fold enough.
+    swing stay above it, none is nearer or further than its leg reaches, and the trunk
+    is high enough for the legs to fold and the knees to clear the ground.
     """
     smoothing = config.smoothing
     targets = Targets(

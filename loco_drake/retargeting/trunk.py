@@ -1,4 +1,8 @@
-"""A trunk high enough for the robot's legs, which fold less than others do."""
+"""A trunk high enough for the robot's legs: they fold less, and kneel before they do.
+
+A robot whose knees all point backward cannot copy a low crawl of one whose knees point
+at each other: a foot far ahead of its hip takes the knee to the ground.
+"""
 
 from dataclasses import replace
 
@@ -6,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from loco_drake.models.kinematics import leg_joints
 from loco_drake.models.robots import Robot
 from loco_drake.retargeting.scaling import Targets
 from loco_drake.rotations import quat_rotate
@@ -14,33 +19,64 @@ Array = NDArray[np.float64]
 
 # A leg in stance right under its hip is at least this much longer than fully folded.
 FOLD_MARGIN = 1.1
+# Height of the knees' axes over the ground in m: the thigh's radius and some air.
+KNEE_CLEARANCE = 0.03
 # Over this time before and after a lift the trunk rises and sinks, s.
 RAMP_SECONDS = 0.14
 
+_MAX_ROUNDS = 6
+_CLOSE_ENOUGH = 0.002
+
 
 def folded_length(robot: Robot) -> float:
-    """Returns thigh joint to toe in m with the calf at its limit: as near as can be."""
+    """Returns how near in m a toe can be to its thigh joint, the calf at its limit."""
     l1, l2 = robot.thigh_length, robot.calf_length
     square = l1**2 + l2**2 + 2 * l1 * l2 * np.cos(robot.joint_lower[2])
     return float(np.sqrt(square))
 
 
-def lowest_hip_height(robot: Robot) -> float:
-    """Returns the height in m over the ground under which no hip joint may be."""
-    return robot.foot_radius + FOLD_MARGIN * folded_length(robot)
-
-
 def raise_trunk(targets: Targets, robot: Robot, fps: float) -> Targets:
-    """Returns ``targets`` with the trunk raised where a hip joint would be too low.
+    """Returns ``targets`` with the trunk raised where the legs ask for it.
 
-    Pitch and everything else are kept; the trunk rises gently, and never less than is
-    needed.
+    That is where a hip is so low that a leg under it could not fold enough, or a knee
+    is lower than :data:`KNEE_CLEARANCE`. Heading, pitch and toes are kept; the trunk
+    rises and sinks gently.
     """
-    p_BHip = np.broadcast_to(robot.p_BHip, (len(targets.p_WB), 4, 3))
-    rise = quat_rotate(targets.q_WB[:, None], p_BHip)[..., 2].min(axis=1)
-    missing = lowest_hip_height(robot) - (targets.p_WB[:, 2] + rise)
-    lift = _gentle_envelope(np.maximum(missing, 0.0), round(RAMP_SECONDS * fps))
-    return replace(targets, p_WB=targets.p_WB + lift[:, None] * np.array([0, 0, 1.0]))
+    lowest_hip = robot.foot_radius + FOLD_MARGIN * folded_length(robot)
+    ramp = round(RAMP_SECONDS * fps)
+    for _ in range(_MAX_ROUNDS):
+        hips, knees = _hip_and_knee_heights(targets, robot)
+        missing = np.maximum(lowest_hip - hips, KNEE_CLEARANCE - knees)
+        if missing.max() < _CLOSE_ENOUGH:
+            break
+        lift = _gentle_envelope(np.maximum(missing, 0.0), ramp)
+        up = np.array([0.0, 0.0, 1.0])
+        targets = replace(targets, p_WB=targets.p_WB + lift[:, None] * up)
+    return targets
+
+
+def _hip_and_knee_heights(targets: Targets, robot: Robot) -> tuple[Array, Array]:
+    """Returns the heights in m of the lowest hip and the lowest knee, each (T,)."""
+    joints = np.clip(
+        leg_joints(robot, targets.p_BF), robot.joint_lower, robot.joint_upper
+    )
+    a, b = joints[:, 0::3], joints[:, 1::3]
+    d, down = robot.abduction_offset, -robot.thigh_length * np.cos(b)
+    p_BKnee = robot.p_BHip + np.stack(
+        (
+            -robot.thigh_length * np.sin(b),
+            np.cos(a) * d - np.sin(a) * down,
+            np.sin(a) * d + np.cos(a) * down,
+        ),
+        axis=-1,
+    )
+    q_WB, height = targets.q_WB[:, None], targets.p_WB[:, 2]
+    p_BHip = np.broadcast_to(robot.p_BHip, p_BKnee.shape)
+    hips, knees = (
+        height + quat_rotate(q_WB, points)[..., 2].min(axis=1)
+        for points in (p_BHip, p_BKnee)
+    )
+    return hips, knees
 
 
 def _gentle_envelope(values: Array, ramp: int) -> Array:
@@ -50,8 +86,7 @@ def _gentle_envelope(values: Array, ramp: int) -> Array:
     values that are averaged is at least that of the frame in the middle.
     """
     half = ramp // 2
-    envelope = maximum_filter1d(values, 4 * half + 1, mode="nearest")
+    envelope: Array = maximum_filter1d(values, 4 * half + 1, mode="nearest")
     for _ in range(2):
         envelope = uniform_filter1d(envelope, 2 * half + 1, mode="nearest")
-    smooth_envelope: Array = envelope
-    return smooth_envelope
+    return envelope

@@ -3,6 +3,7 @@ import pytest
 
 from loco_drake.datasets.dog import read_dog
 from loco_drake.errors import InputError
+from tests.spoil import spoil
 from tests.synthetic import write_dog_recording
 
 
@@ -34,51 +35,6 @@ def test_stretch_outside_the_file_is_refused(tmp_path, start, end):
     write_dog_recording(tmp_path / "dog.txt", seconds=1.0)
     with pytest.raises(InputError, match="which has 60 frames"):
         read_dog(tmp_path / "dog.txt", gait="pace", start=start, end=end)
-
-
-def spoil(text: str, how: str) -> bytes:
-    lines = text.splitlines()
-    match how:
-        case "empty":
-            return b""
-        case "blank":
-            return b"\n\n"
-        case "cut within a line":
-            return text[: len(text) - 300].encode()
-        case "cut within a number":
-            return text[:-4].encode() + b"-"
-        case "nan":
-            lines[7] = lines[7].replace(lines[7].split(",")[40], "nan")
-        case "infinity":
-            lines[7] = "inf," + lines[7].split(",", 1)[1]
-        case "words":
-            lines[3] = "a," + lines[3].split(",", 1)[1]
-        case "semicolons":
-            return text.replace(",", ";").encode()
-        case "spaces":
-            return text.replace(",", " ").encode()
-        case "tabs":
-            return text.replace(",", "\t").encode()
-        case "column missing":
-            lines = [line.rsplit(",", 1)[0] for line in lines]
-        case "blank line":
-            lines.insert(9, "")
-        case "shuffled":
-            np.random.default_rng(0).shuffle(lines)
-        case "centimetres":
-            lines = [
-                ",".join(str(100 * float(value)) for value in line.split(","))
-                for line in lines
-            ]
-        case "binary":
-            return np.random.default_rng(1).bytes(5000)
-        case "zeros":
-            return bytes(5000)
-        case "utf-16":
-            return text.encode("utf-16")
-        case _:
-            raise AssertionError(how)
-    return ("\n".join(lines) + "\n").encode()
 
 
 REASONS = {
