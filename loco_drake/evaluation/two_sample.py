@@ -31,7 +31,7 @@ FOLDS = 5
 def fit_forest(features: Array, classes: NDArray[np.int64]) -> RandomForestClassifier:
     """Fits a random forest, which sees what no straight line separates."""
     forest = RandomForestClassifier(
-        n_estimators=200, min_samples_leaf=2, max_features="sqrt", random_state=0
+        n_estimators=100, min_samples_leaf=2, max_features="sqrt", random_state=0
     )
     return forest.fit(features, classes)
 
