@@ -6,8 +6,9 @@ of a toe ahead of the trunk, along the trunk's heading:
 
 Stride period
     The lag T of the first high peak of the correlation between the four x(t) and the
-    four x(t + T), refined by a parabola through the peak and its neighbours. Only lags
-    up to a third of the clip are looked at: a period is told of three strides at least.
+    four x(t + T), up to half of the clip, refined by a parabola through the peak and
+    its neighbours. It is told only of a clip that is three such strides long (fewer
+    where that is asked for).
 Phase lag
     How far a toe's cycle is behind that of RL, as a share of the stride, 0 to 1: the
     difference of the phases of the fundamentals of their x(t), which are fitted by
@@ -128,7 +129,7 @@ def gait_timing(track: Track, strides: int = MIN_STRIDES) -> GaitTiming | None:
 def stride_period(track: Track, strides: int = MIN_STRIDES) -> float | None:
     """Returns the stride period in s, None without ``strides`` of one rhythm."""
     signals = track.fore_aft
-    lags = (len(signals) - 1) // strides
+    lags = (len(signals) - 1) // 2
     correlation = np.array([_correlation(signals, lag) for lag in range(lags + 2)])
     inner = correlation[1:-1]
     peaks = 1 + np.flatnonzero((inner > correlation[:-2]) & (inner >= correlation[2:]))
@@ -138,7 +139,10 @@ def stride_period(track: Track, strides: int = MIN_STRIDES) -> float | None:
     peak = int(peaks[high][0])
     before, top, after = correlation[peak - 1 : peak + 2]
     vertex = (before - after) / (2 * (before - 2 * top + after))
-    return float((peak + vertex) / track.fps)
+    period = float(peak + vertex)
+    # A hair's grace for a clip of just as many strides.
+    enough = len(signals) - 1 >= strides * period - 0.5
+    return period / track.fps if enough else None
 
 
 def phase_lags(track: Track, period: float) -> Array:

@@ -1,6 +1,10 @@
+import csv
+import re
+
 import numpy as np
 import pytest
 
+from loco_drake.datasets.segments import read_segments
 from loco_drake.gait_timing import (
     Track,
     clip_track,
@@ -109,3 +113,36 @@ def test_timing_of_a_robot_that_turns(gait):
     lag = timing.phase_lags - PHASES[gait]
     assert np.abs((lag + 0.5) % 1 - 0.5).max() < 0.01
     np.testing.assert_allclose(timing.duty_factors, 0.5, atol=0.05)
+
+
+def test_every_other_stride_longer_is_a_rhythm_of_two():
+    """Strides of .34 and .4 s in turn repeat each .74 s: three of those take 2.2 s."""
+    seconds = {2.6: 0.74, 2.0: None}
+    for length, period in seconds.items():
+        track = swinging(0.37, seconds=length)
+        time = np.arange(len(track.soles)) / FPS
+        phase = time / 0.74 + 0.04 * np.sin(2 * np.pi * time / 0.74)
+        fore_aft = 0.08 * np.cos(4 * np.pi * (phase[:, None] - LAGS / 2))
+        fore_aft += 0.03 * np.cos(2 * np.pi * phase)[:, None]
+        track.soles[..., 0] = track.trunk[:, :1] + fore_aft
+        found = stride_period(track)
+        assert found == (period and pytest.approx(period, abs=0.005))
+
+
+def test_rhythm_of_real_recordings_is_what_their_list_says(real_data):
+    """Period and lags were noted, to .01, by whoever made segments.csv."""
+    with (real_data / "segments.csv").open() as file:
+        notes = [row["notes"] for row in csv.DictReader(file)]
+    pattern = re.compile(r"period ([.\d]+)s lag FL/FR/RL/RR ([./\d]+) yaw \S+rad")
+    checked = 0
+    for segment, note in zip(read_segments(real_data), notes, strict=True):
+        found = pattern.match(note)
+        if found is None or segment.source != "dog" or segment.gait == "gallop":
+            continue
+        timing = gait_timing(clip_track(segment.read(), STANCE_HEIGHT))
+        if timing is not None:
+            lag = timing.phase_lags - np.array(found[2].split("/"), dtype=float)
+            assert timing.stride_period == pytest.approx(float(found[1]), abs=0.02)
+            assert np.abs((lag + 0.5) % 1 - 0.5).max() < 0.025
+            checked += 1
+    assert checked > 20

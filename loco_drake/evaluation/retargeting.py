@@ -11,6 +11,7 @@ joint_limit_violations   summed
 joint_speed_ratio_max    the worst clip's
 toe_error_rmse_m         root of the mean square over all frames and toes of all clips
 correction_rmse_m        the same
+trunk_correction_rmse_m  root of the mean square over all frames of all clips
 stride_period_error, phase_lag_error, duty_factor_error
                          mean over the clips of at least three strides
 clips                    their number; those that failed are not counted
@@ -46,6 +47,7 @@ _WORST_OF_REPORT = (
     "joint_speed_ratio_max",
     "toe_error_rmse_m",
     "correction_rmse_m",
+    "trunk_correction_rmse_m",
 )
 _FIDELITY = ("stride_period_error", "phase_lag_error", "duty_factor_error")
 
@@ -168,6 +170,7 @@ def figures(clips: Sequence[ClipScore]) -> dict[str, Any]:
         "joint_speed_ratio_max": worst("joint_speed_ratio_max"),
         "toe_error_rmse_m": pooled("toe_error_rmse_m"),
         "correction_rmse_m": pooled("correction_rmse_m"),
+        "trunk_correction_rmse_m": pooled("trunk_correction_rmse_m"),
     }
     for key in _FIDELITY:
         values = [getattr(fidelity, key) for fidelity in fidelities]

@@ -22,6 +22,7 @@ def score(gait="trot", name="a", frames=100, fidelity=None, slips=(), **changes)
         "frames_per_second": 500.0,
         "toe_error_rmse_m": 0.001,
         "correction_rmse_m": 0.001,
+        "trunk_correction_rmse_m": 0.001,
         "stance_slip_median_mps": float(np.median(slips)) if len(slips) else None,
         "penetration_max_m": 0.001,
         "joint_limit_violations": 0,
