@@ -14,10 +14,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from loco_drake.errors import InputError
 from loco_drake.evaluation.samples import CHANNELS, FRAMES
 from loco_drake.generation.determinism import single_thread
-from loco_drake.weights import load_into, load_weights, save_weights
+from loco_drake.weights import load_network, save_weights
 
 Array = NDArray[np.float64]
 
@@ -134,12 +133,10 @@ def load_classifier(path: Path) -> GaitClassifier:
     Raises:
         InputError: if the file is missing, damaged, or of something else.
     """
-    tensors, config = load_weights(path, "classifier")
-    try:
-        network = dict(config["network"])
-        network["labels"] = tuple(network["labels"])
-        classifier = GaitClassifier(ClassifierConfig(**network))
-    except (KeyError, TypeError, ValueError):
-        raise InputError(f"{path} has a damaged classifier header.") from None
-    load_into(classifier, tensors, path)
-    return classifier.eval().requires_grad_(False)
+
+    def build(network: dict[str, Any]) -> GaitClassifier:
+        return GaitClassifier(
+            ClassifierConfig(**{**network, "labels": tuple(network["labels"])})
+        )
+
+    return load_network(path, "classifier", build)

@@ -51,8 +51,9 @@ def drift(robot: Robot, motions: Sequence[Motion]) -> dict[str, Any]:
 
     Returns:
         For each figure its means in the first and last WINDOW seconds, the share of
-        motions that lost it, change, tolerance, and drift. A figure that two motions or more do not have in their
-        first window, such as a stride period of a robot that stands, is left out.
+        motions that lost it, change, tolerance, and drift. A figure that fewer than
+        two motions have in their first window, such as a stride period of robots that
+        stand, is left out.
     """
     windows = [round(WINDOW * motion.fps) for motion in motions]
     first = _table(
