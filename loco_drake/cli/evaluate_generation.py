@@ -89,7 +89,7 @@ class EvaluateGeneration:
         for label in self.labels:
             parse_label(label)
         folder = data_dir(self.data_dir)
-        result = of_robots(self.robot, lambda name: self._robot(folder, name))
+        result = of_robots(self.robot, lambda name: self._robot(folder, name), KEYS)
         write_json(self.json, result)
         for name, figures in robot_names(result):
             _print(name, figures)
@@ -191,13 +191,6 @@ _ROWS = {
     "generated -> recorded (diversity)": "generated_to_real",
     "... of as many trajectories": "generated_to_real_matched",
 }
-# Column: key, factor, digits.
-_COLUMNS = {
-    "slip mm/s": ("stance_slip_median_mps", 1000, 1),
-    "sunk mm": ("penetration_max_m", 1000, 2),
-    "jerk ratio": ("jerk_ratio", 1, 2),
-    "speed error m/s": ("speed_error_mps", 1, 3),
-}
 _FIGURES = (
     "fid",
     "fid_real_real",
@@ -207,10 +200,24 @@ _FIGURES = (
     "transfer_joint_rmse_rad",
     "real_time_factor",
 )
+KEYS = (
+    "classifiers",
+    "two_sample_accuracy",
+    *_FIGURES,
+    "labels",
+    "all",
+)
+# Column: key, factor, digits.
+_COLUMNS = {
+    "slip mm/s": ("stance_slip_median_mps", 1000, 1),
+    "sunk mm": ("penetration_max_m", 1000, 2),
+    "jerk ratio": ("jerk_ratio", 1, 2),
+    "speed error m/s": ("speed_error_mps", 1, 3),
+}
 
 
 def _print(name: str, result: dict[str, Any]) -> None:
-    if "classifiers" not in result:
+    if result["classifiers"] is None:
         print_failed([(name, str(result["reason"]))])
         return
     for kind, rows in result["classifiers"].items():

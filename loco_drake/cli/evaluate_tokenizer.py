@@ -71,7 +71,9 @@ class EvaluateTokenizer:
                 f"not {self.books}."
             )
         result = of_robots(
-            self.robot, lambda name: self._robot(folder, tokenizer, name)
+            self.robot,
+            lambda name: self._robot(folder, tokenizer, name),
+            ("labels", "all", "codebook_use"),
         )
         write_json(self.json, result)
         for name, figures in robot_names(result):
@@ -97,7 +99,7 @@ class EvaluateTokenizer:
 
 
 def _print(name: str, result: dict[str, Any]) -> None:
-    if "labels" not in result:
+    if result["labels"] is None:
         print_failed([(name, result["reason"])])
         return
     held_out, train = (

@@ -1,6 +1,6 @@
 """What the ``evaluate`` commands share."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +18,18 @@ def check_at_least(option: str, value: int, least: int) -> None:
         raise InputError(f"--{name} must be {least} or more, not {value}.")
 
 
-def of_robots(robot: str, evaluate: Callable[[str], dict[str, Any]]) -> dict[str, Any]:
+def of_robots(
+    robot: str, evaluate: Callable[[str], dict[str, Any]], keys: Iterable[str]
+) -> dict[str, Any]:
     """Returns the figures of ``robot``, or of all by name.
 
-    With "all", a robot that cannot be evaluated says why; if none can, that is an
-    error.
+    With "all", the figures of a robot that cannot be evaluated are null, and its
+    "reason" says why; if none can, that is an error.
 
     Args:
         robot: a name, or "all".
         evaluate: returns the figures of one robot.
+        keys: of the figures.
 
     Raises:
         InputError: from ``evaluate``.
@@ -35,13 +38,15 @@ def of_robots(robot: str, evaluate: Callable[[str], dict[str, Any]]) -> dict[str
     if robot != "all":
         return {"robot": robot, **evaluate(robot)}
     results: dict[str, dict[str, Any]] = {}
+    errors = []
     for name in ROBOTS:
         try:
             results[name] = evaluate(name)
         except InputError as error:
-            results[name] = {"reason": str(error)}
-    if all(set(result) == {"reason"} for result in results.values()):
-        raise InputError(str(next(iter(results.values()))["reason"]))
+            errors.append(error)
+            results[name] = {**dict.fromkeys(keys), "reason": str(error)}
+    if len(errors) == len(ROBOTS):
+        raise errors[0]
     return {"robots": results}
 
 

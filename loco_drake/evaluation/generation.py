@@ -186,7 +186,7 @@ def _two_sample(
 
     return {
         "two_sample_accuracy": test(real, generated),
-        "two_sample_accuracy_forest": test(real, generated, "forest"),
+        "two_sample_accuracy_kernel": test(real, generated, "kernel"),
         "two_sample_accuracy_of_parts": {
             name: test(part(real, columns), part(generated, columns))
             for name, columns in SUMMARY.items()

@@ -24,14 +24,14 @@ def real():
     return samples(0)
 
 
-@pytest.mark.parametrize("fit", ["linear", "forest"])
+@pytest.mark.parametrize("fit", ["linear", "kernel"])
 def test_motion_of_the_same_kind_is_not_told_apart(real, fit):
     estimate = two_sample_accuracy(real, samples(1), [0], fit)
     assert 0.35 < estimate.mean < 0.65
     assert estimate.low < 0.5 < estimate.high
 
 
-@pytest.mark.parametrize("fit", ["linear", "forest"])
+@pytest.mark.parametrize("fit", ["linear", "kernel"])
 def test_a_little_noise_is_told(real, fit):
     """One degree on the joints."""
     estimate = two_sample_accuracy(real, samples(1, noise=0.017), [0], fit)
@@ -50,13 +50,13 @@ def test_learning_recordings_by_heart_does_not_help(real):
     """Every trajectory twice under one subject: the copy is in the same fold."""
     index = np.repeat(np.arange(len(real)), 2)
     twice, other = real[index], samples(1)[index]
-    assert 0.3 < two_sample_accuracy(twice, other, [0], "forest").mean < 0.7
+    assert 0.3 < two_sample_accuracy(twice, other, [0], "kernel").mean < 0.7
     # If folds parted copies, even motion of one kind would seem to be told apart.
     alone = [
         replace(each, subjects=np.array([f"{i}" for i in range(len(each))]))
         for each in (twice, other)
     ]
-    assert two_sample_accuracy(*alone, [0], "forest").mean > 0.8
+    assert two_sample_accuracy(*alone, [0], "kernel").mean > 0.7
 
 
 def test_too_few_recordings_to_tell(real):
