@@ -14,6 +14,7 @@ from loco_drake.weights import load_into, load_weights, save_weights
 
 from .joint_targets import ACTION_SCALE
 from .observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
+from .symmetry import mirror_actions, mirror_observations
 
 KIND = "policy"
 OBSERVATION_CLIP = 5.0  # standard deviations
@@ -43,7 +44,11 @@ class ActorConfig:
 
 
 class Actor(nn.Module):
-    """Normalises an observation and maps it to the mean action."""
+    """Normalises an observation and maps it to the mean action.
+
+    The layers are applied to the observation and to its mirror image, and averaged: the
+    action of a mirrored observation is the mirrored action (:mod:`.symmetry`).
+    """
 
     mean: Tensor
     variance: Tensor
@@ -63,7 +68,10 @@ class Actor(nn.Module):
     def forward(self, observation: Tensor) -> Tensor:
         """Returns actions (..., 12) for observations (..., OBSERVATION_SIZE)."""
         normal = (observation - self.mean) / torch.sqrt(self.variance + 1e-8)
-        return self.layers(normal.clamp(-OBSERVATION_CLIP, OBSERVATION_CLIP))
+        normal = normal.clamp(-OBSERVATION_CLIP, OBSERVATION_CLIP)
+        image = self.layers(mirror_observations(normal))
+        action: Tensor = (self.layers(normal) + mirror_actions(image)) / 2
+        return action
 
 
 def save_actor(actor: Actor, path: Path, *, half: bool = False) -> None:

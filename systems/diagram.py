@@ -50,6 +50,7 @@ def MakeLocomotionDiagram(
         - state
         - observation
         - action
+        - desired_state
         - net_actuation
         - reward_terms
 
@@ -123,6 +124,7 @@ def MakeLocomotionDiagram(
     builder.ExportOutput(state, "state")
     builder.ExportOutput(observation.GetOutputPort("observation"), "observation")
     builder.ExportOutput(targets.GetOutputPort("action"), "action")
+    builder.ExportOutput(targets.GetOutputPort("desired_state"), "desired_state")
     builder.ExportOutput(plant.get_net_actuation_output_port(instance), "net_actuation")
     builder.ExportOutput(reward.GetOutputPort("reward_terms"), "reward_terms")
 

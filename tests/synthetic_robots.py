@@ -40,13 +40,13 @@ class SyntheticRobot:
 
 
 def make_robot(
-    gait: Gait, time: Array, half_length: float, height: float, lift: float
+    gait: Gait, time: Array, half_length: float, lateral: float, lift: float
 ) -> SyntheticRobot:
-    """Returns a robot whose level trunk moves straight ahead at constant speed."""
+    """Returns a robot whose level trunk, .2 m up, moves ahead at constant speed."""
     zero, one = np.zeros_like(time), np.ones_like(time)
-    middle = np.stack((gait.speed * time, zero, height * one), axis=-1)
+    middle = np.stack((gait.speed * time, zero, 0.2 * one), axis=-1)
     ahead = np.array([half_length, 0.0, 0.0])
-    toes, contacts = make_steps(gait, time, (half_length, -half_length), 0.1, lift)
+    toes, contacts = make_steps(gait, time, (half_length, -half_length), lateral, lift)
     return SyntheticRobot(middle + ahead, middle - ahead, toes, contacts)
 
 
@@ -55,7 +55,7 @@ def write_mpc_recording(
 ) -> SyntheticRobot:
     """Writes a run that stands ``ground`` m above z = 0, .4 rad off the x axis."""
     time = np.arange(round(seconds * fps)) / fps
-    robot = make_robot(MPC_GAITS[gait], time, 0.1505, 0.2, 0.062)
+    robot = make_robot(MPC_GAITS[gait], time, 0.1505, 0.1, 0.062)
     points = _points(robot, 0.044, feet_first=True)
     save_points(path, place(points + np.array([0.0, 0.0, ground]), 0.4))
     return robot
@@ -66,7 +66,7 @@ def write_solo8_recording(
 ) -> SyntheticRobot:
     """Writes a run that begins with a drop; the truth has all frames, also those."""
     time = (np.arange(frames) - SETTLED * drop) / 50.0
-    robot = make_robot(SOLO8_GAIT, time, 0.19, 0.2, 0.05)
+    robot = make_robot(SOLO8_GAIT, time, 0.19, 0.15, 0.05)
     points = _points(robot, 0.104, feet_first=False)
     points[:, 5:, 2] += FOOT_RADIUS
     if drop:

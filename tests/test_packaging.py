@@ -58,6 +58,8 @@ def test_wheel_has_code_models_weights_and_configuration(wheel):
     assert found >= expected
     for name in (
         "py.typed",
+        "datasets/manifest.csv",
+        "datasets/segments.csv",
         "retargeting/sources/dog.yaml",
         "models/package.xml",
         "models/go2/go2.urdf",
@@ -82,7 +84,9 @@ def test_wheel_has_one_package_its_licence_and_no_recordings(wheel):
     assert f"{info}/licenses/LICENSE" in names
     suffixes = {Path(name).suffix for name in names if not name.startswith(info)}
     data = {".urdf", ".xml", ".yaml", ".md", ".safetensors"}
-    assert suffixes <= {".py", ".typed", *data}
+    assert suffixes <= {".py", ".typed", ".csv", *data}
+    tables = {name for name in names if name.endswith(".csv")}
+    assert tables == {f"loco_drake/datasets/{t}.csv" for t in ("manifest", "segments")}
     assert size < 20e6
 
 

@@ -1,6 +1,6 @@
 """The command ``evaluate generation``."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,12 @@ from loco_drake.cli.evaluation import (
     robot_names,
     write_figure,
 )
-from loco_drake.cli.output import print_failed, print_table, write_json
+from loco_drake.cli.output import (
+    print_failed,
+    print_figures,
+    print_table,
+    write_json,
+)
 from loco_drake.datasets.registry import data_dir
 from loco_drake.errors import InputError
 from loco_drake.evaluation.generation import Generated, GenerationScore
@@ -200,6 +205,7 @@ _FIGURES = (
     "transfer_joint_rmse_rad",
     "real_time_factor",
 )
+_ESTIMATE = ("mean", "low", "high")
 KEYS = (
     "classifiers",
     "two_sample_accuracy",
@@ -231,22 +237,13 @@ def _print(name: str, result: dict[str, Any]) -> None:
             ],
         )
     labels = {**result["labels"], "all": result["all"]}
-    print_table(
-        f"{name}: motion", ["label", *_COLUMNS], [_row(k, v) for k, v in labels.items()]
+    print_figures(f"{name}: motion", "label", _COLUMNS, labels)
+    nothing = dict.fromkeys(_ESTIMATE)
+    figures = {key.replace("_", " "): {"mean": result[key]} for key in _FIGURES}
+    two_sample = {"real or generated, linear": result["two_sample_accuracy"] or {}}
+    print_figures(
+        f"{name}: all labels",
+        "figure",
+        {key: (key, 1, 4) for key in _ESTIMATE},
+        {key: {**nothing, **row} for key, row in (two_sample | figures).items()},
     )
-    rows = [
-        ["real or generated, linear", estimate_text(result["two_sample_accuracy"])],
-        *([key.replace("_", " "), _number(result[key], 4)] for key in _FIGURES),
-    ]
-    print_table(f"{name}: all labels", ["figure", "value"], rows)
-
-
-def _row(label: str, figures: dict[str, Any]) -> Sequence[str]:
-    return [
-        label,
-        *(_number(figures[k], digits, f) for k, f, digits in _COLUMNS.values()),
-    ]
-
-
-def _number(value: float | None, digits: int, factor: float = 1) -> str:
-    return "-" if value is None else f"{value * factor:.{digits}f}"

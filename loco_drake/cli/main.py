@@ -18,6 +18,7 @@ _COMMANDS = {
     "generate": ("generate", "Generate", "write Motion files for a gait"),
     "retarget": ("retarget", "Retarget", "recordings to Motion files of a robot"),
     "data list": ("data", "DataList", "the sources of motion and their licences"),
+    "data fetch": ("fetch", "DataFetch", "download the recordings, checked"),
     "data inspect": ("data", "DataInspect", "one stretch of a recording as a picture"),
     "train tokenizer": ("train_tokenizer", "TrainTokenizer", "motion to tokens"),
     "train generator": (
@@ -45,6 +46,11 @@ _COMMANDS = {
         "evaluate_generation",
         "EvaluateGeneration",
         "how generated motion compares with recorded motion",
+    ),
+    "evaluate tracking": (
+        "evaluate_tracking",
+        "EvaluateTracking",
+        "how well the policy follows its references",
     ),
 }
 _HELP = ("-h", "--help")

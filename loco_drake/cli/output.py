@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,34 @@ def print_table(
         table.add_row(*row)
     # Rich takes a file or a pipe for a terminal of 80 columns.
     Console(width=None if sys.stdout.isatty() else 160).print(table)
+
+
+def print_figures(
+    title: str,
+    first: str,
+    columns: Mapping[str, tuple[str, float, int]],
+    rows: Mapping[str, Mapping[str, Any]],
+) -> None:
+    """Prints figures by name as a table to stdout.
+
+    Args:
+        title: over the table.
+        first: title of the first column, which holds the keys of ``rows``.
+        columns: title to key, factor and digits of what is printed.
+        rows: figures, numbers or None, of each row by key.
+    """
+
+    def text(value: float | None, factor: float, digits: int) -> str:
+        return "-" if value is None else f"{value * factor:.{digits}f}"
+
+    print_table(
+        title,
+        [first, *columns],
+        (
+            [name] + [text(row[key], factor, n) for key, factor, n in columns.values()]
+            for name, row in rows.items()
+        ),
+    )
 
 
 def print_failed(failed: Iterable[tuple[str, str]]) -> None:

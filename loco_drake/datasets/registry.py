@@ -115,29 +115,38 @@ def read_clip(
         fps: frames per second; None if the format, the file or its motion tells.
 
     Raises:
-        InputError: if the source is unknown, the file not of its format, or the
-            stretch not within it.
+        InputError: if the source is unknown, the file not of its format, the stretch
+            not within it, or the rate not above 0.
     """
     dataset = get_dataset(source)
+    if fps is not None and not 0 < fps < float("inf"):
+        raise InputError(f"A rate must be above 0 frames/s, not {fps:g}.")
     clip = dataset.read(path, gait=gait, start=start, end=end, fps=fps)
     origin = {"licence": dataset.licence, "attribution": dataset.attribution}
     return replace(clip, provenance={**clip.provenance, **origin})
 
 
-def data_dir(path: Path | None = None) -> Path:
-    """Returns the folder of the recordings.
+def data_target(path: Path | None = None) -> Path:
+    """Returns where the folder of the recordings is, or is to be.
 
     It is ``path`` if given, else that of the variable ``LOCO_DRAKE_DATA``, else
     ``data`` in the user's cache folder.
+    """
+    given = path or os.environ.get(DATA_VARIABLE)
+    return Path(given) if given else cache_dir() / "data"
+
+
+def data_dir(path: Path | None = None) -> Path:
+    """Returns the folder of the recordings, as :func:`data_target` chooses it.
 
     Raises:
         InputError: if there is no such folder.
     """
-    given = path or os.environ.get(DATA_VARIABLE)
-    folder = Path(given) if given else cache_dir() / "data"
+    folder = data_target(path)
     if not folder.is_dir():
         raise InputError(
-            f"There is no data folder {str(folder)!r}: name one with --data-dir or "
-            f"the environment variable {DATA_VARIABLE}."
+            f"There is no data folder {str(folder)!r}: loco-drake data fetch downloads "
+            "the recordings, or name a folder with --data-dir or the environment "
+            f"variable {DATA_VARIABLE}."
         )
     return folder

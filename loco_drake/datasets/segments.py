@@ -1,16 +1,14 @@
 """Which stretch of which file holds which gait: ``segments.csv`` of the data folder."""
 
-import csv
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from loco_drake.datasets.registry import DATASETS, read_clip
+from loco_drake.datasets.segment_table import read_rows
 from loco_drake.errors import InputError, check_choice
 from loco_drake.keypoints import KeypointClip
-
-COLUMNS = ("dataset", "file", "gait", "start_frame", "end_frame", "fps")
 
 # Horse<animal>_M<day of measurement>_<gait><number>...
 _HORSE = re.compile(r"(Horse\d+)_M\d+_")
@@ -100,19 +98,14 @@ def read_segments(data_dir: Path) -> list[Segment]:
     table = Path(data_dir) / "segments.csv"
     sources = {dataset.folder: dataset.source for dataset in DATASETS.values()}
     try:
-        with table.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
+        rows = read_rows(table)
     except OSError:
         raise InputError(
-            f"The data folder {str(data_dir)!r} lacks segments.csv."
+            f"The data folder {str(data_dir)!r} lacks segments.csv; "
+            "loco-drake data fetch writes it."
         ) from None
-    except (UnicodeDecodeError, csv.Error):
-        raise InputError(f"{table} is damaged: it is not a CSV table.") from None
     segments = []
     for line, row in enumerate(rows, start=2):
-        missing = [name for name in COLUMNS if not row.get(name)]
-        if missing:
-            raise InputError(f"{table}: line {line} lacks {', '.join(missing)}.")
         if row["dataset"] not in sources:
             continue
         try:

@@ -19,10 +19,10 @@ from loco_drake.models.plant import ConfigureSimulator
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
 from loco_drake.systems.fall import has_fallen
-from loco_drake.systems.plan import PLAN_DT
+from loco_drake.systems.plan import PLAN_DT, Plan
 from loco_drake.systems.scenario import Scenario
 
-_LOGGED = ("state", "plan_state", "path_time", "reward_terms")
+_LOGGED = ("state", "plan_state", "path_time", "desired_state", "reward_terms")
 
 
 class Recorder:
@@ -59,24 +59,26 @@ class Recorder:
         """The root context."""
         return self.simulator.get_mutable_context()
 
-    def start(self, *, gait: str | None = None, seed: int = 0) -> None:
+    def start(
+        self, *, gait: str | None = None, seed: int = 0, plan: Plan | None = None
+    ) -> None:
         """Puts the clock to 0, the robot on its plan and empties the logs.
 
         Args:
             gait: of a generated reference, instead of the scenario's.
             seed: of a generated reference, used with ``gait``.
+            plan: of a reference that is played, instead of the scenario's.
         """
         self._fell = False
         self.simulator.clear_monitor()
         self.diagram.SetDefaultContext(self.context)
         self.context.SetTime(0.0)
+        reference = self.locomotion.GetSubsystemByName("reference")
+        context = reference.GetMyMutableContextFromRoot(self.context)
         if gait is not None:
-            generator = self.locomotion.GetSubsystemByName("reference")
-            generator.SetReference(
-                generator.GetMyMutableContextFromRoot(self.context),
-                gait=gait,
-                seed=seed,
-            )
+            reference.SetReference(context, gait=gait, seed=seed)
+        if plan is not None:
+            reference.SetPlan(context, plan)
         StartOnPlan(self.simulator, self.locomotion)
         for log in self._logs.values():
             log.FindMutableLog(self.context).Clear()
@@ -114,6 +116,7 @@ class Recorder:
             state=data["state"],
             plan_state=data["plan_state"],
             path_time=data["path_time"][:, 0],
+            desired_joints=data["desired_state"][:, :12],
             reward=data["reward_terms"].sum(axis=1),
             steps=steps,
             fell=self._fell,

@@ -9,6 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.models.kinematics import toe_positions
+from loco_drake.models.robots import Robot
+from loco_drake.motion import FPS
+from loco_drake.motion_quality import stance_slip_speeds
 from loco_drake.rotations import (
     quat_error,
     quat_multiply,
@@ -16,6 +20,7 @@ from loco_drake.rotations import (
     yaw_of,
     yaw_quat,
 )
+from loco_drake.systems.feed_forward import GRAVITY
 from loco_drake.systems.plan import PLAN_DT
 
 Array = NDArray[np.float64]
@@ -33,6 +38,7 @@ class Rollout:
         state: the plant's [q, v] at each sample, shape (N + 1, 37).
         plan_state: the same of the plan.
         path_time: seconds of unsmoothed motion that have passed, shape (N + 1,).
+        desired_joints: set-points of the PD in rad, shape (N + 1, 12).
         reward: of each sample, shape (N + 1,); that of the first is not counted.
         steps: how many steps were to be made; more than N if the robot fell.
         fell: whether it did.
@@ -41,13 +47,14 @@ class Rollout:
     state: Array
     plan_state: Array
     path_time: Array
+    desired_joints: Array
     reward: Array
     steps: int
     fell: bool
 
 
 def tracking_metrics(rollout: Rollout) -> dict[str, float]:
-    """Returns all figures of a rollout, by name."""
+    """Returns how well the plan was followed, all figures by name."""
     position, orientation = base_errors(rollout)
     return {
         "normalized_return": normalized_return(rollout),
@@ -113,3 +120,36 @@ def speed(rollout: Rollout) -> float:
     yaw = yaw_of(rollout.state[:, :4])
     v = rollout.state[:, 22:25]
     return float(np.mean(v[:, 0] * np.cos(yaw) + v[:, 1] * np.sin(yaw)))
+
+
+def slip_speeds(rollout: Rollout, robot: Robot) -> Array:
+    """Horizontal speeds of the simulated toes in stance, m/s, shape (M,).
+
+    See :func:`loco_drake.motion_quality.stance_slip_speeds`.
+    """
+    q = rollout.state[:, :19]
+    p_WF = q[:, None, 4:7] + quat_rotate(q[:, None, :4], toe_positions(robot, q[:, 7:]))
+    return stance_slip_speeds(p_WF, robot.foot_radius, FPS)
+
+
+def effort_metrics(rollout: Rollout, robot: Robot) -> dict[str, float]:
+    """Returns what the actuators have to do, all figures by name.
+
+    With the torque that the PD asks for, tau = kp (q_d - q) - kd v, cut at the effort
+    limit:
+
+    - torque_saturation: share of samples and joints at the effort limit
+    - speed_saturation: share of samples and joints at the speed limit or beyond
+    - cost_of_transport: mean of sum |tau v| over mass, gravity and mean horizontal
+      speed; what braking returns is not counted as a gain
+    """
+    q, v = rollout.state[:, 7:19], rollout.state[:, 25:]
+    asked = robot.kp * (rollout.desired_joints - q) - robot.kd * v
+    torque = np.clip(asked, -robot.effort_limits, robot.effort_limits)
+    power = float(np.abs(torque * v).sum(axis=1).mean())
+    speed = float(np.linalg.norm(rollout.state[:, 22:24], axis=1).mean())
+    return {
+        "torque_saturation": float(np.mean(np.abs(asked) >= robot.effort_limits)),
+        "speed_saturation": float(np.mean(np.abs(v) >= robot.joint_speed_limits)),
+        "cost_of_transport": power / (robot.mass * GRAVITY * max(speed, 1e-3)),
+    }

@@ -10,7 +10,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
 
 from loco_drake.systems.actor import OBSERVATION_CLIP, Actor, ActorConfig
 from loco_drake.systems.observation import OBSERVATION_SIZE
-from loco_drake.tracking.symmetry import SymmetricRolloutBuffer, SymmetricStatistics
+from loco_drake.tracking.symmetric_policy import SymmetricPolicy, SymmetricStatistics
 
 
 @dataclass(kw_only=True)
@@ -19,7 +19,7 @@ class PpoConfig:
 
     Attributes:
         batch: environment steps between updates.
-        minibatch: steps in a gradient step; their mirror images come on top.
+        minibatch: steps in a gradient step.
         epochs: passes over a batch.
         gamma: discount a step.
         gae_lambda: of generalized advantage estimation.
@@ -111,7 +111,7 @@ def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
     )
     normalized.obs_rms = cast(Any, SymmetricStatistics(shape=(OBSERVATION_SIZE,)))
     learner = AdaptivePPO(
-        "MlpPolicy",
+        SymmetricPolicy,
         normalized,
         learning_rate=config.actor_rate,
         n_steps=config.batch // environment.num_envs,
@@ -122,7 +122,6 @@ def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
         clip_range=config.clip,
         ent_coef=0.0,
         max_grad_norm=1.0,
-        rollout_buffer_class=SymmetricRolloutBuffer,
         policy_kwargs={
             "net_arch": {"pi": config.hidden, "vf": config.hidden},
             "activation_fn": torch.nn.ELU,

@@ -7,11 +7,13 @@ from loco_drake.gaits import LABELS
 from loco_drake.systems.plan import Plan
 
 _MEMORY = 0.98  # weight of the past in a label's score, per episode
-_FLOOR = 0.1  # even a perfect gait is drawn now and then, so that it is not forgotten
+# Even a perfect gait is drawn now and then, so that it is not forgotten; and those that
+# hardly begin to work must not take the time of those that are being learned.
+_LEAST, _MOST = 0.1, 0.5
 
 
 class PlanSampler:
-    """Draws labels in proportion to the return they still lack, plans uniformly.
+    """Draws labels in proportion to the return they lack, within bounds; then a plan.
 
     Args:
         plans: what to draw from; the label of a plan is that of its first sample.
@@ -27,7 +29,7 @@ class PlanSampler:
 
     def draw(self) -> int:
         """Returns the index of a plan."""
-        lack = np.maximum(1 - self.scores[self.present], _FLOOR)
+        lack = np.clip(1 - self.scores[self.present], _LEAST, _MOST)
         label = self.random.choice(self.present, p=lack / lack.sum())
         return int(self.random.choice(np.flatnonzero(self._labels == label)))
 

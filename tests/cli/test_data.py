@@ -5,6 +5,8 @@ import tyro
 
 from loco_drake.cli.data import DataInspect, DataList
 from loco_drake.errors import InputError
+from tests.synthetic_horse import make_horse, write_raw_recording
+from tests.synthetic_robots import write_mpc_recording, write_solo8_recording
 
 
 def test_list_counts_clips_frames_seconds_and_names_the_licence(
@@ -41,3 +43,39 @@ def test_inspect_of_a_file_of_another_format_leaves_no_picture(tmp_path):
     with pytest.raises(InputError, match="3 comma-separated columns instead of 81"):
         inspect.run()
     assert not (tmp_path / "a.png").exists()
+
+
+def test_list_and_inspect_know_all_sources(tmp_path, capsys):
+    rows = ["dataset,file,gait,start_frame,end_frame,fps"]
+    files = {
+        "horse": tmp_path / "horse_vhdc" / "Horse1_M1_walk1.csv",
+        "mpc": tmp_path / "mpc_rfmpc" / "bound.txt",
+        "solo8": tmp_path / "solo8_cassi" / "walk" / "a.txt",
+    }
+    write_raw_recording(files["horse"], make_horse("walk", 60.0))
+    write_mpc_recording(files["mpc"], "bound")
+    write_solo8_recording(files["solo8"])
+    rows.append("horse_vhdc,Horse1_M1_walk1.csv,walk,0,360,60")
+    rows.append("mpc_rfmpc,bound.txt,bound,50,500,100")
+    rows.append("solo8_cassi,walk/a.txt,walk,20,120,50")
+    (tmp_path / "segments.csv").write_text("\n".join(rows) + "\n")
+    listing = DataList(data_dir=tmp_path, json=tmp_path / "list.json")
+    assert listing.run() == 0
+    figures = json.loads((tmp_path / "list.json").read_text())
+    assert {source: row["clips"] for source, row in figures.items()} == {
+        "dog": 0,
+        "horse": 1,
+        "mpc": 1,
+        "solo8": 1,
+    }
+    assert figures["horse"]["licence"].startswith("CC BY-SA")
+    assert figures["mpc"]["seconds"] == 4.5
+    speeds = {"horse": 1.55, "mpc": 0.7, "solo8": 0.4}
+    for source, file in files.items():
+        out, numbers = tmp_path / f"{source}.png", tmp_path / f"{source}.json"
+        inspect = DataInspect(file=file, source=source, out=out, json=numbers)
+        assert inspect.run() == 0
+        assert out.read_bytes().startswith(b"\x89PNG")
+        speed = json.loads(numbers.read_text())["speed_mean_mps"]
+        assert speed == pytest.approx(speeds[source], rel=0.02)
+    assert "CC BY-SA" in capsys.readouterr().out

@@ -6,6 +6,8 @@ import tyro
 from loco_drake.cli.retarget import Retarget
 from loco_drake.errors import InputError
 from loco_drake.motion import load_motion
+from tests.synthetic_horse import make_horse, write_world_recording
+from tests.synthetic_robots import write_mpc_recording, write_solo8_recording
 
 KEYS = {
     "frames",
@@ -13,6 +15,7 @@ KEYS = {
     "toe_error_rmse_m",
     "stance_slip_median_mps",
     "penetration_max_m",
+    "trunk_correction_rmse_m",
     "joint_limit_violations",
     "joint_speed_ratio_max",
     "correction_rmse_m",
@@ -107,3 +110,58 @@ def test_truncated_file_is_wrong_input_and_leaves_nothing_behind(made_data, tmp_
     with pytest.raises(InputError, match="cut off"):
         command(tmp_path / "cut.txt", *options).run()
     assert not out.exists()
+
+
+SOURCES = {
+    "horse": ("Horse14_M3_trot1.txt", "trot", 6.0),
+    "mpc": ("trot_0.9_1_50.txt", "trot", 5.0),
+    "solo8": ("motion_data_7.txt", "walk", 2.0),
+}
+
+
+def write_recording(source, folder):
+    path = folder / SOURCES[source][0]
+    match source:
+        case "horse":
+            write_world_recording(path, make_horse("trot", 120.0))
+        case "mpc":
+            write_mpc_recording(path, "trot")
+        case "solo8":
+            write_solo8_recording(path)
+    return path
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_recording_never_seen_before_needs_neither_code_nor_segments(tmp_path, source):
+    """Without a data folder; the length at 50 Hz tells that the rate was found."""
+    file, (_, gait, seconds) = write_recording(source, tmp_path), SOURCES[source]
+    options = ("--source", source, "--gait", gait, "--robot", "a1", "--out", tmp_path)
+    assert command(file, *options).run() == 0
+    (path,) = tmp_path.glob(f"{source}-{gait}-{file.stem}-*.npz")
+    motion = load_motion(path)
+    assert (motion.robot, str(motion.label)) == ("a1", f"{source}-{gait}")
+    if source == "solo8":
+        assert path.stem.endswith("-20-120")
+    assert len(motion) == pytest.approx(50 * seconds, abs=1)
+    assert motion.provenance["licence"]
+    assert command(file, *options, "--start", 30, "--end", 70).run() == 0
+    assert (tmp_path / f"{source}-{gait}-{file.stem}-30-70.npz").is_file()
+
+
+def test_rate_given_by_hand_is_taken(tmp_path):
+    """The same 720 frames are twice as long at 60 frames/s."""
+    file = write_recording("horse", tmp_path)
+    options = ("--source", "horse", "--gait", "trot", "--out", tmp_path, "--fps", 60)
+    assert command(file, *options).run() == 0
+    motion = load_motion(tmp_path / f"horse-trot-{file.stem}-0-720.npz")
+    assert len(motion) == pytest.approx(600, abs=1)
+    with pytest.raises(InputError, match="--fps need a FILE"):
+        command("--fps", 60, "--out", tmp_path).run()
+
+
+def test_file_of_another_source_leaves_nothing_behind(tmp_path):
+    file = write_recording("mpc", tmp_path)
+    options = ("--source", "solo8", "--gait", "trot", "--out", tmp_path / "out")
+    with pytest.raises(InputError, match="is not a solo8 keypoint file"):
+        command(file, *options).run()
+    assert not (tmp_path / "out").exists()

@@ -7,12 +7,15 @@ from scipy.spatial.transform import Rotation
 from loco_drake.evaluation.tracking import (
     Rollout,
     base_errors,
+    effort_metrics,
     joint_rmse,
     normalized_return,
+    slip_speeds,
     speed,
     stretch,
     tracking_metrics,
 )
+from loco_drake.models.robots import get_robot
 
 STEPS = 250  # 5 s: two windows of 2 s and half of a third
 TIME = 0.02 * np.arange(STEPS + 1)
@@ -30,6 +33,7 @@ def perfect():
         state=plan.copy(),
         plan_state=plan,
         path_time=TIME.copy(),
+        desired_joints=plan[:, 7:19].copy(),
         reward=np.ones(STEPS + 1),
         steps=STEPS,
         fell=False,
@@ -117,3 +121,31 @@ def test_a_robot_that_stands_still_scores_badly(perfect):
     figures = tracking_metrics(replace(perfect, state=still))
     assert figures["base_position_rmse_m"] > 0.7
     assert figures["speed_mps"] == 0.0
+
+
+def test_simulated_feet_that_slide_are_seen(perfect):
+    """A robot in its stance carried along at .7 m/s slides at .7 m/s on four feet."""
+    go2 = get_robot("go2")
+    perfect.state[:, 6], perfect.state[:, 7:19] = go2.stand_height, go2.stand_joints
+    slip = slip_speeds(perfect, go2)
+    assert len(slip) == 4 * STEPS
+    np.testing.assert_allclose(slip, 0.7)
+    perfect.state[:, 6] += 0.011  # in the air
+    assert not len(slip_speeds(perfect, go2))
+
+
+def test_effort_by_hand(perfect):
+    """One joint turns at 2 rad/s against .1 rad of error, another is far from it."""
+    go2 = get_robot("go2")
+    perfect.desired_joints[:, 1] += 0.1
+    perfect.state[:, 26] = 2.0
+    perfect.desired_joints[:, 5] += 3.0
+    torque = go2.kp[1] * 0.1 - go2.kd[1] * 2.0
+    figures = effort_metrics(perfect, go2)
+    assert figures["torque_saturation"] == pytest.approx(1 / 12)
+    assert figures["speed_saturation"] == 0.0
+    power = abs(torque) * 2.0  # the other joint does not move
+    expected = power / (go2.mass * 9.81 * 0.7)
+    assert figures["cost_of_transport"] == pytest.approx(expected)
+    perfect.state[:, 25:] = -1.001 * go2.joint_speed_limits
+    assert effort_metrics(perfect, go2)["speed_saturation"] == 1.0

@@ -2,20 +2,8 @@ import numpy as np
 import pytest
 
 from loco_drake.models.kinematics import toe_positions
-from loco_drake.models.robots import get_robot
-from loco_drake.retargeting.inverse_kinematics import LegSolver
 
 FPS = 50.0
-
-
-@pytest.fixture(scope="module", params=["go2", "a1"])
-def robot(request):
-    return get_robot(request.param)
-
-
-@pytest.fixture(scope="module")
-def solver(robot):
-    return LegSolver(robot, FPS)
 
 
 def swinging_joints(robot, frames=60, amplitude=0.3):

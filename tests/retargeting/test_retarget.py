@@ -6,7 +6,6 @@ from loco_drake.datasets.dog import read_dog
 from loco_drake.datasets.segments import read_segments, select_segments
 from loco_drake.errors import InputError
 from loco_drake.keypoints import KeypointClip
-from loco_drake.models.robots import get_robot
 from loco_drake.motion import FPS
 from loco_drake.retargeting.config import load_config
 from loco_drake.retargeting.inverse_kinematics import LegSolver
@@ -14,16 +13,6 @@ from loco_drake.retargeting.retarget import retarget_clip, within_reach
 from loco_drake.retargeting.scaling import Targets
 from loco_drake.rotations import yaw_of
 from tests.synthetic import GAITS, STANCE_HEIGHT, make_dog, write_dog_recording
-
-
-@pytest.fixture(scope="module", params=["go2", "a1"])
-def robot(request):
-    return get_robot(request.param)
-
-
-@pytest.fixture(scope="module")
-def solver(robot):
-    return LegSolver(robot, FPS)
 
 
 def assert_good(report):

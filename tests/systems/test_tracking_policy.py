@@ -11,6 +11,7 @@ from loco_drake.systems.actor import (
     save_actor,
 )
 from loco_drake.systems.observation import OBSERVATION_SIZE
+from loco_drake.systems.symmetry import mirror_actions, mirror_observations
 from loco_drake.systems.tracking_policy import TrackingPolicy
 from loco_drake.weights import load_weights, save_weights
 
@@ -26,7 +27,7 @@ def actor():
 
 
 def test_the_system_computes_the_network(actor):
-    """By numpy: normalise, clip, two ELU layers, one linear."""
+    """By numpy: normalise, clip, two ELU layers, one linear; as it is and mirrored."""
     observation = 3 * np.random.default_rng(0).standard_normal(OBSERVATION_SIZE)
     policy = TrackingPolicy(actor)
     context = policy.CreateDefaultContext()
@@ -34,10 +35,14 @@ def test_the_system_computes_the_network(actor):
     x = (observation - actor.mean.numpy()) / np.sqrt(actor.variance.numpy() + 1e-8)
     x = np.clip(x, -5, 5)
     weights = [p.detach().double().numpy() for p in actor.layers.parameters()]
-    for W, b in zip(weights[0:4:2], weights[1:4:2], strict=True):
-        x = W @ x + b
-        x = np.where(x > 0, x, np.exp(np.minimum(x, 0)) - 1)
-    expected = weights[4] @ x + weights[5]
+    results = []
+    for seen in (x, mirror_observations(x)):
+        hidden = seen
+        for W, b in zip(weights[0:4:2], weights[1:4:2], strict=True):
+            hidden = W @ hidden + b
+            hidden = np.where(hidden > 0, hidden, np.exp(np.minimum(hidden, 0)) - 1)
+        results.append(weights[4] @ hidden + weights[5])
+    expected = (results[0] + mirror_actions(results[1])) / 2
     action = policy.GetOutputPort("action").Eval(context)
     np.testing.assert_allclose(action, expected, atol=1e-5)
 

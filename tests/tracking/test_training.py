@@ -11,6 +11,7 @@ from loco_drake.gaits import parse_label
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.actor import load_actor
 from loco_drake.systems.observation import OBSERVATION_SIZE
+from loco_drake.systems.symmetry import mirror_actions, mirror_observations
 from loco_drake.tracking.checkpoint import load_checkpoint
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.ppo import PpoConfig
@@ -94,13 +95,19 @@ def test_the_policy_is_the_learners(trained):
     )
     mean = tensors["normalizer/mean"]
     std = torch.sqrt(tensors["normalizer/variance"] + 1e-8)
-    x = ((observation - mean) / std).clamp(-5, 5).float()
-    for layer in ("mlp_extractor.policy_net.0", "mlp_extractor.policy_net.2"):
-        W, b = (tensors[f"policy/{layer}.{part}"] for part in ("weight", "bias"))
-        x = torch.nn.functional.elu(W @ x + b)
-    W, b = (tensors[f"policy/action_net.{part}"] for part in ("weight", "bias"))
+    normal = ((observation - mean) / std).clamp(-5, 5).float()
+
+    def network(x):
+        for layer in ("mlp_extractor.policy_net.0", "mlp_extractor.policy_net.2"):
+            W, b = (tensors[f"policy/{layer}.{part}"] for part in ("weight", "bias"))
+            x = torch.nn.functional.elu(W @ x + b)
+        W, b = (tensors[f"policy/action_net.{part}"] for part in ("weight", "bias"))
+        return W @ x + b
+
+    image = mirror_actions(network(mirror_observations(normal)))
+    expected = (network(normal) + image) / 2
     with torch.inference_mode():
-        torch.testing.assert_close(actor(observation), W @ x + b, atol=1e-5, rtol=1e-5)
+        torch.testing.assert_close(actor(observation), expected, atol=1e-5, rtol=1e-5)
 
 
 def test_progress_is_logged(trained):
@@ -140,12 +147,19 @@ def test_a_killed_worker_is_reported(plans):
 
 
 def test_the_sampler_prefers_what_lacks_most(plans):
-    """Trot at .9 lacks .1, pace at .5 lacks .5: five draws in six are a pace."""
+    """Trot at .9 lacks .1, pace at .5 lacks .5: five draws in six are a pace.
+
+    What lacks more than half is drawn as if it lacked half.
+    """
     sampler = PlanSampler(plans, 0)
     sampler.scores[TROT], sampler.scores[PACE] = 0.9, 0.5
     draws = np.array([sampler.draw() for _ in range(3000)])
     share = np.mean([plans[i].labels[0] == PACE for i in draws])
     assert share == pytest.approx(5 / 6, abs=0.03)
+    sampler.scores[TROT], sampler.scores[PACE] = 0.5, 0.0
+    draws = np.array([sampler.draw() for _ in range(3000)])
+    share = np.mean([plans[i].labels[0] == PACE for i in draws])
+    assert share == pytest.approx(1 / 2, abs=0.03)
 
 
 def test_scores_follow_what_episodes_return(plans):

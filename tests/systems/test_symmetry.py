@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import torch
 
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import (
@@ -11,15 +12,10 @@ from loco_drake.motion import (
     MIRROR_POLAR,
     MIRROR_QUATERNION,
 )
+from loco_drake.systems.actor import Actor, ActorConfig
 from loco_drake.systems.observation import OBSERVATION_SIZE, observe, preview
 from loco_drake.systems.plan import plan_from_motion
-from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
-from loco_drake.tracking.symmetry import (
-    SymmetricRolloutBuffer,
-    SymmetricStatistics,
-    mirror_actions,
-    mirror_observations,
-)
+from loco_drake.systems.symmetry import mirror_actions, mirror_observations
 from tests.synthetic_motion import synthetic_motion
 
 
@@ -61,33 +57,25 @@ def test_mirroring_twice_changes_nothing():
     np.testing.assert_array_equal(mirror_actions(mirror_actions(actions)), actions)
 
 
-def test_minibatches_hold_each_step_and_its_image():
-    buffer = SymmetricRolloutBuffer(4, OBSERVATION_SPACE, ACTION_SPACE, n_envs=2)
+def test_arrays_and_tensors_mirror_alike():
     random = np.random.default_rng(2)
-    buffer.observations[:] = random.standard_normal((4, 2, OBSERVATION_SIZE))
-    buffer.actions[:] = random.standard_normal((4, 2, 12))
-    buffer.advantages[:] = np.arange(8).reshape(4, 2)
-    buffer.full = True
-    batches = list(buffer.get(4))
-    assert [len(batch.actions) for batch in batches] == [8, 8]
-    for batch in batches:
-        steps, images = batch.actions[:4].numpy(), batch.actions[4:].numpy()
-        np.testing.assert_allclose(mirror_actions(steps), images)
-        seen, mirrored = batch.observations.numpy().reshape(2, 4, -1)
-        np.testing.assert_allclose(mirror_observations(seen), mirrored)
-        first, second = batch.advantages.numpy().reshape(2, 4)
-        np.testing.assert_array_equal(first, second)
-    assert sorted(float(a) for b in batches for a in b.advantages[:4]) == [*range(8)]
+    observations = random.standard_normal((5, OBSERVATION_SIZE)).astype(np.float32)
+    actions = random.standard_normal((5, 12)).astype(np.float32)
+    for mirror, values in (
+        (mirror_observations, observations),
+        (mirror_actions, actions),
+    ):
+        np.testing.assert_array_equal(
+            mirror(torch.from_numpy(values)).numpy(), mirror(values)
+        )
 
 
-def test_normalized_observations_mirror_like_any():
-    """Left joints at 1, right ones at 0: the statistics are those of both sides."""
-    statistics = SymmetricStatistics(shape=(OBSERVATION_SIZE,))
-    random = np.random.default_rng(3)
-    for _ in range(3):
-        statistics.update(1.0 + random.standard_normal((50, OBSERVATION_SIZE)))
-    np.testing.assert_allclose(
-        mirror_observations(statistics.mean), statistics.mean, atol=1e-6
-    )
-    assert statistics.mean[1] == pytest.approx(0.0, abs=1e-12)  # y of gravity
-    assert statistics.count == pytest.approx(300, abs=1)
+def test_the_policy_of_a_mirrored_world_acts_mirrored():
+    torch.manual_seed(0)
+    actor = Actor(ActorConfig(robot="go2", labels=[], hidden=[32, 16]))
+    observations = torch.randn(6, OBSERVATION_SIZE)
+    with torch.inference_mode():
+        actions = actor(observations)
+        mirrored = actor(mirror_observations(observations))
+    torch.testing.assert_close(mirror_actions(actions), mirrored)
+    assert (mirrored - actions).abs().max() > 0.01

@@ -1,0 +1,156 @@
+"""The command ``evaluate tracking``."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import Progress
+
+from loco_drake.cli.output import print_figures, write_json
+from loco_drake.datasets.registry import data_dir
+from loco_drake.datasets.segments import read_segments
+from loco_drake.errors import InputError, check_choice
+from loco_drake.evaluation.tracking_table import (
+    Trial,
+    generated_trials,
+    retargeted_trials,
+    run_trials,
+    summarize,
+)
+from loco_drake.gaits import parse_label
+from loco_drake.generation.generate import check_duration
+from loco_drake.models.plant import PlantConfig
+from loco_drake.models.robots import ROBOTS, get_robot
+from loco_drake.systems.actor import load_actor
+from loco_drake.systems.pretrained import policy_path
+from loco_drake.systems.scenario import (
+    GeneratedReference,
+    PlanReference,
+    Scenario,
+    TrainedPolicy,
+)
+
+
+@dataclass(kw_only=True)
+class EvaluateTracking:
+    """Simulates many episodes and says how well the policy follows its references."""
+
+    robot: str = "go2"
+    """The robot: go2, a1 or all."""
+    labels: tuple[str, ...] = ()
+    """Such as dog-trot dog-pace. Default: those that the policy was trained on."""
+    reference: str = "generated"
+    """generated: written by the generator while the simulation runs; or retargeted:
+    stretches of the recordings."""
+    seeds: int = 20
+    """Episodes of each label, at most; the first generated one has --seed."""
+    duration: float = 10.0
+    """Seconds of each episode; of a recording at most its length."""
+    policy: Path | None = None
+    """Weights of the policy. Default: those that come with the package."""
+    contact: str = "similar"
+    """Contact solver: similar, lagged, sap or cenic."""
+    time_step: float = 0.01
+    """Step of the physics, s."""
+    accuracy: float = 1e-4
+    """Of cenic, which controls its error."""
+    friction: float = 0.8
+    """Friction of the ground."""
+    data_dir: Path | None = None
+    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
+    workers: int = 1
+    """Processes."""
+    seed: int = 0
+    """Of the first generated reference of each label."""
+    json: Path | None = None
+    """Writes the figures to this file."""
+
+    def run(self) -> int:
+        """Simulates, prints a table for each robot and writes; returns 0.
+
+        Raises:
+            InputError: if an option is wrong, or a robot has no weights.
+        """
+        check_choice("robot", self.robot, (*ROBOTS, "all"))
+        check_choice("reference", self.reference, ("generated", "retargeted"))
+        check_duration(self.duration)
+        if self.seeds < 1:
+            raise InputError(f"--seeds must be 1 or more, not {self.seeds}.")
+        names = list(ROBOTS) if self.robot == "all" else [self.robot]
+        plans = {name: self._plan(name) for name in names}
+        results = {name: self._evaluate(name, *plan) for name, plan in plans.items()}
+        whole = results.get(self.robot, {"robots": results})
+        write_json(self.json, whole)
+        for name, result in results.items():
+            title = (
+                f"{name}, {self.reference}, {self.contact}: "
+                f"{result['real_time_factor']:.1f} times real time"
+            )
+            rows = {**result["labels"], "all of these": result["all"]}
+            print_figures(title, "label", _COLUMNS, rows)
+        return 0
+
+    def _plan(self, name: str) -> tuple[Scenario, list[Trial]]:
+        """Returns what to simulate for a robot."""
+        robot = get_robot(name)
+        weights = self.policy or policy_path(robot)
+        trained = load_actor(weights, robot).config.labels
+        labels = [str(parse_label(label)) for label in self.labels or trained]
+        plant = PlantConfig(
+            contact=self.contact,
+            time_step=self.time_step,
+            accuracy=self.accuracy,
+            friction=self.friction,
+        )
+        plant.check()
+        scenario = Scenario(
+            robot=name, plant=plant, policy=TrainedPolicy(weights=weights)
+        )
+        if self.reference == "retargeted":
+            scenario.reference = PlanReference()
+            segments = read_segments(data_dir(self.data_dir))
+            return scenario, retargeted_trials(
+                segments, labels, self.seeds, self.duration
+            )
+        scenario.reference = GeneratedReference(gait=labels[0], duration=self.duration)
+        seeds = range(self.seed, self.seed + self.seeds)
+        return scenario, generated_trials(labels, seeds, self.duration)
+
+    def _evaluate(
+        self, name: str, scenario: Scenario, trials: list[Trial]
+    ) -> dict[str, Any]:
+        with Progress(console=Console(stderr=True), transient=True) as progress:
+            episodes = list(
+                progress.track(
+                    run_trials(scenario, trials, self.workers),
+                    total=len(trials),
+                    description=f"Simulating {name}",
+                )
+            )
+        conditions = {
+            "robot": name,
+            "reference": self.reference,
+            "contact": self.contact,
+            "time_step_s": self.time_step,
+            "friction": self.friction,
+            "duration_s": self.duration,
+        }
+        return {**conditions, **summarize(episodes)}
+
+
+# Title: key, factor, digits.
+_COLUMNS = {
+    "return": ("normalized_return", 1, 1),
+    "worst": ("normalized_return_worst", 1, 1),
+    "falls %": ("fall_rate", 100, 0),
+    "joints rad": ("joint_rmse_rad", 1, 3),
+    "base m": ("base_position_rmse_m", 1, 3),
+    "base rad": ("base_orientation_rmse_rad", 1, 3),
+    "slip m/s": ("stance_slip_median_mps", 1, 3),
+    "stretch": ("stretch", 1, 3),
+    "m/s": ("speed_mps", 1, 2),
+    "torque limit %": ("torque_saturation", 100, 1),
+    "transport": ("cost_of_transport", 1, 2),
+    "episodes": ("episodes", 1, 0),
+}

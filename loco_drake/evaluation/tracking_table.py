@@ -1,0 +1,206 @@
+"""How well a policy tracks many references, label by label.
+
+An episode's figures are those of :mod:`loco_drake.evaluation.tracking`. A label's are
+made of its episodes':
+
+======================== ==============================================================
+normalized_return        mean; the worst episode's beside it
+fall_rate                share of episodes
+joint_rmse_rad, base_position_rmse_m, base_orientation_rmse_rad
+                         root of the mean square over all samples of all episodes
+stance_slip_median_mps   median over all steps of all toes in stance of all episodes
+stretch, speed_mps, torque_saturation, speed_saturation, cost_of_transport
+                         mean
+real_time_factor         simulated over wall seconds inside AdvanceTo, warm
+======================== ==============================================================
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.datasets.segments import Segment
+from loco_drake.errors import InputError
+from loco_drake.evaluation.rollout import Recorder
+from loco_drake.evaluation.tracking import (
+    effort_metrics,
+    slip_speeds,
+    tracking_metrics,
+)
+from loco_drake.models.robots import get_robot
+from loco_drake.parallel import map_in_workers
+from loco_drake.retargeting.batch import SegmentRetargeter
+from loco_drake.systems.plan import PLAN_DT, plan_from_motion
+from loco_drake.systems.scenario import PlanReference, Scenario
+
+_POOLED = ("joint_rmse_rad", "base_position_rmse_m", "base_orientation_rmse_rad")
+_MEANS = (
+    "stretch",
+    "speed_mps",
+    "torque_saturation",
+    "speed_saturation",
+    "cost_of_transport",
+)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One episode to simulate.
+
+    Attributes:
+        label: the gait.
+        seed: of the generator; or which of the segments it is.
+        duration: s; of a recorded reference at most its length.
+        segment: the recording to follow; None to follow the generator.
+    """
+
+    label: str
+    seed: int
+    duration: float
+    segment: Segment | None = None
+
+
+@dataclass(frozen=True)
+class Episode:
+    """What came of a trial.
+
+    Attributes:
+        trial: the trial.
+        figures: of the episode, by name.
+        slip: speeds of the toes in stance, m/s, shape (M,).
+        samples: how many were simulated.
+        fell: whether the robot did.
+        wall: seconds spent inside AdvanceTo.
+    """
+
+    trial: Trial
+    figures: dict[str, float]
+    slip: NDArray[np.float64]
+    samples: int
+    fell: bool
+    wall: float
+
+
+class _Runner:
+    """Simulates one trial after the other in one diagram."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._robot = get_robot(scenario.robot)
+        self._recorder = Recorder(scenario)
+        self._retargeter: SegmentRetargeter | None = None
+        # The first step sets up torch.
+        self._recorder.start()
+        self._recorder.run(PLAN_DT)
+
+    def __call__(self, trial: Trial) -> Episode:
+        duration = trial.duration
+        if trial.segment is None:
+            self._recorder.start(gait=trial.label, seed=trial.seed)
+        else:
+            plan = self._plan(trial.segment)
+            duration = min(duration, plan.end_time)
+            self._recorder.start(plan=plan)
+        rollout, wall = self._recorder.run(duration)
+        return Episode(
+            trial=trial,
+            figures=tracking_metrics(rollout) | effort_metrics(rollout, self._robot),
+            slip=slip_speeds(rollout, self._robot),
+            samples=len(rollout.state),
+            fell=rollout.fell,
+            wall=wall,
+        )
+
+    def _plan(self, segment: Segment) -> Any:
+        if self._retargeter is None:
+            self._retargeter = SegmentRetargeter(self._robot)
+        result = self._retargeter(segment)
+        if isinstance(result, str):
+            raise InputError(f"{segment.name} cannot be retargeted: {result}")
+        _, motion, _ = result
+        return plan_from_motion(self._robot, motion)
+
+
+def generated_trials(
+    labels: Iterable[str], seeds: Iterable[int], duration: float
+) -> list[Trial]:
+    """Returns a trial for each label and seed."""
+    seeds = list(seeds)
+    return [Trial(label, seed, duration) for label in labels for seed in seeds]
+
+
+def retargeted_trials(
+    segments: Sequence[Segment], labels: Iterable[str], count: int, duration: float
+) -> list[Trial]:
+    """Returns up to ``count`` trials of each label, evenly spread over its segments.
+
+    Raises:
+        InputError: if a label has no segment.
+    """
+    trials = []
+    for label in labels:
+        own = [segment for segment in segments if segment.label == label]
+        if not own:
+            raise InputError(f"segments.csv has no stretch of {label}.")
+        chosen = np.unique(np.linspace(0, len(own) - 1, count).round().astype(int))
+        trials += [Trial(label, int(k), duration, own[k]) for k in chosen]
+    return trials
+
+
+def run_trials(
+    scenario: Scenario, trials: Sequence[Trial], workers: int = 1
+) -> Iterator[Episode]:
+    """Simulates trials, and yields what came of each, in their order.
+
+    Args:
+        scenario: with a generated reference, or a PlanReference where the trials have
+            segments.
+        trials: all of one kind.
+        workers: processes.
+    """
+    recorded = isinstance(scenario.reference, PlanReference)
+    if any((trial.segment is not None) != recorded for trial in trials):
+        raise ValueError("the trials are not of the scenario's kind of reference")
+    return map_in_workers(partial(_Runner, scenario), trials, workers)
+
+
+def summarize(episodes: Sequence[Episode]) -> dict[str, Any]:
+    """Returns ``{"labels": {LABEL: figures}, "all": figures, "real_time_factor"}``."""
+    labels = list(dict.fromkeys(episode.trial.label for episode in episodes))
+    simulated = sum((episode.samples - 1) * PLAN_DT for episode in episodes)
+    return {
+        "labels": {
+            label: figures([e for e in episodes if e.trial.label == label])
+            for label in labels
+        },
+        "all": figures(episodes),
+        "real_time_factor": simulated / sum(episode.wall for episode in episodes),
+    }
+
+
+def figures(episodes: Sequence[Episode]) -> dict[str, Any]:
+    """Returns the figures of episodes, at least one, taken together."""
+
+    def values(name: str) -> NDArray[np.float64]:
+        return np.array([episode.figures[name] for episode in episodes])
+
+    samples = np.array([episode.samples for episode in episodes])
+    slip = np.concatenate([episode.slip for episode in episodes])
+    result: dict[str, Any] = {
+        "normalized_return": float(values("normalized_return").mean()),
+        "normalized_return_worst": float(values("normalized_return").min()),
+        "fall_rate": float(np.mean([episode.fell for episode in episodes])),
+    }
+    for name in _POOLED:
+        squares = values(name) ** 2
+        result[name] = float(np.sqrt(squares @ samples / samples.sum()))
+    result["stance_slip_median_mps"] = float(np.median(slip)) if len(slip) else None
+    for name in _MEANS:
+        result[name] = float(values(name).mean())
+    result["episodes"] = len(episodes)
+    if not len(slip):
+        result["reason"] = "no toe ever stands"
+    return result

@@ -1,0 +1,62 @@
+"""Actor and critic that treat left and right alike; see :mod:`..systems.symmetry`."""
+
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3.common.distributions import Distribution
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.running_mean_std import RunningMeanStd
+from torch import Tensor
+
+from loco_drake.systems.symmetry import mirror_actions, mirror_observations
+
+
+class SymmetricPolicy(ActorCriticPolicy):
+    """stable-baselines3's policy, averaged over the robot and its mirror image.
+
+    The mean action mirrors with the observation, and the value does not change with
+    it, exactly. Observations must be normalized by :class:`SymmetricStatistics`.
+    """
+
+    def forward(
+        self, obs: Any, deterministic: bool = False
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Returns actions (B, 12), values (B, 1) and log probabilities (B,)."""
+        distribution, values = self._evaluate(obs)
+        actions = distribution.get_actions(deterministic=deterministic)
+        return actions, values, distribution.log_prob(actions)
+
+    def evaluate_actions(
+        self, obs: Any, actions: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor | None]:
+        """Returns values (B, 1), log probabilities (B,) and entropies (B,)."""
+        distribution, values = self._evaluate(obs)
+        return values, distribution.log_prob(actions), distribution.entropy()
+
+    def get_distribution(self, obs: Any) -> Distribution:
+        """Returns the distribution of actions."""
+        return self._evaluate(obs)[0]
+
+    def predict_values(self, obs: Any) -> Tensor:
+        """Returns values, shape (B, 1)."""
+        return self._evaluate(obs)[1]
+
+    def _evaluate(self, obs: Any) -> tuple[Distribution, Tensor]:
+        latent_pi, latent_vf = self.mlp_extractor(
+            torch.cat((obs, mirror_observations(obs)))
+        )
+        mean, image = self.action_net(latent_pi).chunk(2)
+        value, image_value = self.value_net(latent_vf).chunk(2)
+        mean = (mean + mirror_actions(image)) / 2
+        distribution = self.action_dist.proba_distribution(mean, self.log_std)
+        return distribution, (value + image_value) / 2
+
+
+class SymmetricStatistics(RunningMeanStd):
+    """Mean and variance of observations and their mirror images."""
+
+    def update(self, arr: NDArray[Any]) -> None:
+        """Takes observations (N, OBSERVATION_SIZE) into account."""
+        super().update(np.concatenate((arr, mirror_observations(arr))))
