@@ -113,9 +113,8 @@ def score_model(
     figures, reasons = score.figures, score.figures["reason"]
     if not generated.long:
         reasons["drift_60s"] = "Fewer than two motions of a minute were asked for."
-    for name in labels:
-        if name not in known:
-            figures["labels"][name] = {**NULL_FIGURES, "reason": NOT_TRAINED}
+    missing = {**NULL_FIGURES, "reason": NOT_TRAINED}
+    figures["labels"] = {name: figures["labels"].get(name, missing) for name in labels}
     transfer = None
     if other_robot is None:
         robots = ", ".join(model.tokenizer.config.robots)
