@@ -87,12 +87,12 @@ def load_library(folder: Path) -> Library:
         )
     train, mirrors, held_out = [], [], []
     for path, motion in motions:
-        clip = _clip(motion, str(path))
+        clip = motion_clip(motion, str(path))
         if motion.provenance.get("split") == VALIDATION:
             held_out.append(clip)
         else:
             train.append(clip)
-            mirrors.append(_clip(motion.mirrored(), str(path)))
+            mirrors.append(motion_clip(motion.mirrored(), str(path)))
     if not train:
         raise InputError(f"All motions in {str(folder)!r} are for validation.")
     both = {clip.recording for clip in train} & {clip.recording for clip in held_out}
@@ -104,7 +104,8 @@ def load_library(folder: Path) -> Library:
     return Library(train=(*train, *mirrors), held_out=tuple(held_out))
 
 
-def _clip(motion: Motion, path: str) -> Clip:
+def motion_clip(motion: Motion, path: str = "") -> Clip:
+    """Returns a motion as a clip; ``path`` names a recording that has no other name."""
     robot = get_robot(motion.robot)
     origin = motion.provenance
     recording = origin.get("animal") or origin.get("recording", path)

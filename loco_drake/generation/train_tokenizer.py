@@ -1,4 +1,4 @@
-"""Training of the tokenizer on windows of clips, and its score.
+"""Training of the tokenizer on windows of clips.
 
 The codebooks follow exponential moving averages of what they stand for, and codes
 that nothing is near to are taken from the batch anew, both by
@@ -6,8 +6,7 @@ vector-quantize-pytorch. The finest books are left out at random, so that the de
 makes the best of the coarse ones alone.
 """
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +18,8 @@ from torch.nn import functional
 from vector_quantize_pytorch import ResidualVQ
 
 from loco_drake.errors import InputError
-from loco_drake.generation.determinism import single_thread
-from loco_drake.generation.features import CONTACTS, JOINTS, VELOCITY, YAW_RATE
-from loco_drake.generation.library import Clip, Library, Sampler
+from loco_drake.generation.features import CONTACTS, VELOCITY, YAW_RATE
+from loco_drake.generation.library import Library, Sampler
 from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
 from loco_drake.generation.training import LoopResult, LoopSettings, train
@@ -46,20 +44,6 @@ WEIGHTS = {
 }
 TOE_SCALE = 0.05  # m
 TOE_SPEED_SCALE = 0.5  # m/s
-
-
-@dataclass(frozen=True)
-class TokenizerScore:
-    """How well a tokenizer gives back what it was given.
-
-    Attributes:
-        joint_rmse_rad: over frames and joints.
-        toe_error_rmse_m: Euclidean distance of the toe spheres' centres, relative to
-            the ground under the trunk, over frames and toes.
-    """
-
-    joint_rmse_rad: float
-    toe_error_rmse_m: float
 
 
 class LearningTokenizer(nn.Module):
@@ -197,39 +181,3 @@ def tokenizer_losses(
         ),
         "commitment": commitment,
     }
-
-
-def score_tokenizer(tokenizer: Tokenizer, clips: Sequence[Clip]) -> TokenizerScore:
-    """Returns how well whole clips survive the way to tokens and back."""
-    toes = Toes([get_robot(name) for name in tokenizer.config.robots])
-    joints, distances = [], []
-    for clip in clips:
-        target = clip_tensor(tokenizer, clip)
-        robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
-        with torch.inference_mode(), single_thread():
-            output = tokenizer.decode(tokenizer.encode(target, robot), robot)
-            apart = toes.positions(output, robot) - toes.positions(target, robot)
-        joints.append((output - target)[..., JOINTS].square().flatten())
-        distances.append(apart.square().sum(dim=-1).flatten())
-    return TokenizerScore(
-        joint_rmse_rad=float(torch.cat(joints).mean().sqrt()),
-        toe_error_rmse_m=float(torch.cat(distances).mean().sqrt()),
-    )
-
-
-def codebook_use(tokenizer: Tokenizer, clips: Sequence[Clip]) -> float:
-    """Returns the share of all books' codes that the clips need, in [0, 1]."""
-    used = torch.zeros(tokenizer.config.books, tokenizer.config.book_size)
-    for clip in clips:
-        robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
-        with torch.inference_mode(), single_thread():
-            codes = tokenizer.encode(clip_tensor(tokenizer, clip), robot)[0]
-        used[torch.arange(tokenizer.config.books), codes] = 1.0
-    return float(used.mean())
-
-
-def clip_tensor(tokenizer: Tokenizer, clip: Clip, start: int = 0) -> Tensor:
-    """Returns a clip's features from ``start`` on, in whole tokens, (1, T, SIZE)."""
-    tokens = (len(clip) - start) // tokenizer.config.frames_per_token
-    end = start + tokens * tokenizer.config.frames_per_token
-    return torch.tensor(clip.features[None, start:end], dtype=torch.float32)

@@ -15,6 +15,7 @@ from loco_drake.generation.generator import (
 from loco_drake.generation.library import load_library
 from loco_drake.generation.motion_model import MotionModel
 from loco_drake.generation.tokenizer import TokenizerConfig, load_tokenizer
+from loco_drake.generation.tokenizer_score import score_tokenizer
 from loco_drake.generation.train_generator import (
     CORRUPTION,
     encode_clips,
@@ -22,7 +23,7 @@ from loco_drake.generation.train_generator import (
     stitched_clips,
     train_generator,
 )
-from loco_drake.generation.train_tokenizer import score_tokenizer, train_tokenizer
+from loco_drake.generation.train_tokenizer import train_tokenizer
 from loco_drake.generation.training import LoopSettings
 
 TINY = TokenizerConfig(width=24, depth=1, frame_width=8, books=2, book_size=16)
