@@ -27,12 +27,15 @@ class Clip:
         recording: the recording that the motion is of, and the animal if it is known;
             clips of one can overlap and are never on both sides of the split.
         features: see :mod:`loco_drake.generation.features`, shape (T, SIZE).
+        performance: file and frames, and whether mirrored: the same for all robots that
+            were given this stretch to follow; empty if nothing is known.
     """
 
     robot: str
     label: GaitLabel
     recording: str
     features: Array
+    performance: str = ""
 
     def __len__(self) -> int:
         return len(self.features)
@@ -114,7 +117,16 @@ def motion_clip(motion: Motion, path: str = "") -> Clip:
         label=motion.label,
         recording=f"{motion.source}-{recording}",
         features=motion_features(robot, motion),
+        performance=_performance(motion),
     )
+
+
+def _performance(motion: Motion) -> str:
+    origin = motion.provenance
+    if "file" not in origin or "frames" not in origin:
+        return ""
+    parts = (origin["file"], origin["frames"], origin.get("mirrored", ""))
+    return " ".join((str(motion.label), *parts))
 
 
 class Sampler:

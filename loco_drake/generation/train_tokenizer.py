@@ -12,25 +12,23 @@ from pathlib import Path
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 from torch import Tensor, nn
 from torch.nn import functional
 from vector_quantize_pytorch import ResidualVQ
 
 from loco_drake.errors import InputError
-from loco_drake.generation.features import CONTACTS, VELOCITY, YAW_RATE
-from loco_drake.generation.library import Library, Sampler
+from loco_drake.generation.features import CONTACTS
+from loco_drake.generation.library import Library
 from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
 from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.generation.windows import WINDOW, PairedWindows
 from loco_drake.models.robots import get_robot
 
 Array = NDArray[np.float64]
 
-WINDOW = 64  # frames
 BATCH = 32  # windows
 FEWEST_BOOKS = 2  # batches are decoded from between so many and all of the books
-TEMPO = 1.15  # windows are played at most this much faster or slower
 
 # Weights of the losses; each is scaled to be about 1 before training.
 WEIGHTS = {
@@ -68,19 +66,27 @@ class LearningTokenizer(nn.Module):
             quantize_dropout_cutoff_index=FEWEST_BOOKS - 1,
         )
 
-    def forward(self, features: Tensor, robot: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(
+        self, features: Tensor, robot: Tensor, decoded_for: Tensor | None = None
+    ) -> tuple[Tensor, Tensor]:
         """Encodes, quantizes and decodes features (B, T, SIZE).
 
         Args:
             features: frames, whole tokens of them.
             robot: index of each window's robot, shape (B,).
+            decoded_for: robots to decode the tokens for, shape (R * B,): first one for
+                each window, then a second for each, and so on. None: the windows' own.
 
         Returns:
-            Reconstruction with contacts as logits, and the commitment loss.
+            Reconstructions (R * B, T, SIZE) with contacts as logits, and the commitment
+            loss.
         """
+        decoded_for = robot if decoded_for is None else decoded_for
         embedded = self.tokenizer.embed(features, robot)
         quantized, _, commitment = self.quantizer(embedded)
-        return self.tokenizer.decode_embedded(quantized, robot), commitment.mean()
+        repeated = quantized.repeat(len(decoded_for) // len(robot), 1, 1)
+        output = self.tokenizer.decode_embedded(repeated, decoded_for)
+        return output, commitment.mean()
 
     def finish(self) -> Tokenizer:
         """Returns the tokenizer with the codebooks as they are now."""
@@ -109,15 +115,11 @@ def train_tokenizer(
     frames = np.concatenate([clip.features for clip in clips])
     learning.tokenizer.set_statistics(torch.tensor(frames, dtype=torch.float32))
     toes = Toes([get_robot(name) for name in config.robots])
-    sampler = Sampler(clips)
-    curves = {clip: CubicSpline(np.arange(len(clip)), clip.features) for clip in clips}
+    windows = PairedWindows(clips, config.robots)
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
-        chosen = [clips[i] for i in sampler(random, BATCH)]
-        windows = [cut_window(curves[clip], random) for clip in chosen]
-        target = torch.tensor(np.stack(windows), dtype=torch.float32)
-        robot = torch.tensor([config.robots.index(clip.robot) for clip in chosen])
-        losses = tokenizer_losses(learning, toes, target, robot)
+        target, robot = windows(random, BATCH)
+        losses = tokenizer_losses(learning, toes, target, robot, encoded=BATCH)
         total = sum(
             (WEIGHTS[name] * loss for name, loss in losses.items()), torch.zeros(())
         )
@@ -132,38 +134,24 @@ def train_tokenizer(
     return tokenizer, result
 
 
-def cut_window(curve: CubicSpline, random: np.random.Generator) -> Array:
-    """Returns WINDOW frames from anywhere in a clip, a little faster or slower.
-
-    Feet that stand still do so at any tempo.
-
-    Args:
-        curve: the features of a clip over its frame numbers.
-        random: decides where and how fast.
-    """
-    last = curve.x[-1]
-    fastest = min(TEMPO, last / (WINDOW - 1))
-    tempo = min(TEMPO ** random.uniform(-1, 1), fastest)
-    start = random.uniform(0, last - tempo * (WINDOW - 1))
-    window: Array = curve(start + tempo * np.arange(WINDOW))
-    window[:, VELOCITY] *= tempo
-    window[:, YAW_RATE] *= tempo
-    window[:, CONTACTS] = window[:, CONTACTS] > 0.5
-    return window
-
-
 def tokenizer_losses(
-    learning: LearningTokenizer, toes: Toes, target: Tensor, robot: Tensor
+    learning: LearningTokenizer,
+    toes: Toes,
+    target: Tensor,
+    robot: Tensor,
+    encoded: int,
 ) -> dict[str, Tensor]:
     """Returns the losses of a batch, unweighted; see :data:`WEIGHTS`.
 
     Args:
         learning: in training mode its codebooks are updated.
         toes: of the tokenizer's robots.
-        target: features, shape (B, T, SIZE).
-        robot: index of each window's robot, shape (B,).
+        target: features, shape (N, T, SIZE).
+        robot: index of each window's robot, shape (N,).
+        encoded: how many windows are encoded, the first ones; all are what is to come
+            out when their tokens are decoded, see :class:`PairedWindows`.
     """
-    output, commitment = learning(target, robot)
+    output, commitment = learning(target[:encoded], robot[:encoded], robot)
     contacts = output[..., CONTACTS]
     error = ((output - target) / learning.tokenizer.std)[..., : CONTACTS.start]
     p_target = toes.positions(target, robot)
