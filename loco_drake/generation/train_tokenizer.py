@@ -6,6 +6,7 @@ vector-quantize-pytorch. The finest books are left out at random, so that the de
 makes the best of the coarse ones alone.
 """
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -17,8 +18,9 @@ from torch.nn import functional
 from vector_quantize_pytorch import ResidualVQ
 
 from loco_drake.errors import InputError
+from loco_drake.gaits import LABELS
 from loco_drake.generation.features import CONTACTS
-from loco_drake.generation.library import Library
+from loco_drake.generation.library import Clip, Library
 from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
 from loco_drake.generation.training import LoopResult, LoopSettings, train
@@ -30,18 +32,56 @@ Array = NDArray[np.float64]
 BATCH = 32  # windows
 FEWEST_BOOKS = 2  # batches are decoded from between so many and all of the books
 
-# Weights of the losses; each is scaled to be about 1 before training.
+# Weights of the losses; each is about 1 before training.
 WEIGHTS = {
-    "features": 1.0,  # squared error in standard deviations
-    "speeds": 0.5,  # ... of its change from frame to frame
-    "accelerations": 0.5,  # ... of the change of that
+    "features": 1.0,  # squared error, see Scales
+    "changes": 0.25,  # ... of the change from frame to frame
+    "jitter": 0.1,  # ... of the change of that
     "toes": 1.0,  # squared error of toe positions, in units of TOE_SCALE
     "toe_speeds": 0.5,  # ... of their velocities over the ground, TOE_SPEED_SCALE
     "contacts": 0.2,  # cross-entropy
     "commitment": 0.25,
 }
+LEAST_SHARE = 0.1  # of a label's scale in that of all
+LEAST_SCALES = (0.02, 0.005, 0.002)  # of deviation, change, jitter: rad, stand heights
 TOE_SCALE = 0.05  # m
 TOE_SPEED_SCALE = 0.5  # m/s
+
+
+class Scales:
+    """How much features vary, by label: the unit of their errors.
+
+    The trunk of a walking horse moves so evenly that, in units of what lies between a
+    walk and a gallop, any jitter of it would be free.
+
+    Args:
+        clips: to measure; a label that none has gets the scales of all.
+    """
+
+    def __init__(self, clips: Sequence[Clip]) -> None:
+        by_label: dict[int, list[Array]] = {}
+        for clip in clips:
+            features = clip.features[:, : CONTACTS.start]
+            by_label.setdefault(clip.label.index, []).append(features)
+        own = {label: _variances(features) for label, features in by_label.items()}
+        everything: Array = np.mean(list(own.values()), axis=0)
+        table = np.stack([own.get(i, everything) for i in range(len(LABELS))])
+        # What hardly varies at all must not become the loudest of all.
+        scales = np.sqrt(np.maximum(table, LEAST_SHARE**2 * everything))
+        scales = np.maximum(scales, np.array(LEAST_SCALES)[:, None])
+        self._scales = torch.tensor(scales, dtype=torch.float32)  # (labels, 3, ...)
+
+    def __call__(self, label: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Returns those of deviations, changes and jitter, (N, 1, ...), for (N,)."""
+        deviation, change, jitter = self._scales[label].unbind(dim=1)
+        return deviation[:, None], change[:, None], jitter[:, None]
+
+
+def _variances(clips: Sequence[Array]) -> Array:
+    """Returns those of (T, N) about their mean, and mean squares of changes, (3, N)."""
+    orders = [np.concatenate([np.diff(x, n=n, axis=0) for x in clips]) for n in (1, 2)]
+    squares = [np.square(order).mean(axis=0) for order in orders]
+    return np.stack((np.concatenate(clips).var(axis=0), *squares))
 
 
 class LearningTokenizer(nn.Module):
@@ -112,14 +152,18 @@ def train_tokenizer(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
         learning = LearningTokenizer(Tokenizer(config))
+    with torch.no_grad():
+        # To begin with a still picture: first to unlearn jitter kills most codes.
+        learning.tokenizer.decoder_out.weight.mul_(0.01)
     frames = np.concatenate([clip.features for clip in clips])
     learning.tokenizer.set_statistics(torch.tensor(frames, dtype=torch.float32))
     toes = Toes([get_robot(name) for name in config.robots])
     windows = PairedWindows(clips, config.robots)
+    scales = Scales(clips)
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
-        target, robot = windows(random, BATCH)
-        losses = tokenizer_losses(learning, toes, target, robot, encoded=BATCH)
+        target, robot, label = windows(random, BATCH)
+        losses = tokenizer_losses(learning, toes, scales(label), target, robot, BATCH)
         total = sum(
             (WEIGHTS[name] * loss for name, loss in losses.items()), torch.zeros(())
         )
@@ -137,6 +181,7 @@ def train_tokenizer(
 def tokenizer_losses(
     learning: LearningTokenizer,
     toes: Toes,
+    scales: tuple[Tensor, Tensor, Tensor],
     target: Tensor,
     robot: Tensor,
     encoded: int,
@@ -146,6 +191,7 @@ def tokenizer_losses(
     Args:
         learning: in training mode its codebooks are updated.
         toes: of the tokenizer's robots.
+        scales: of the windows, see :class:`Scales`.
         target: features, shape (N, T, SIZE).
         robot: index of each window's robot, shape (N,).
         encoded: how many windows are encoded, the first ones; all are what is to come
@@ -153,15 +199,16 @@ def tokenizer_losses(
     """
     output, commitment = learning(target[:encoded], robot[:encoded], robot)
     contacts = output[..., CONTACTS]
-    error = ((output - target) / learning.tokenizer.std)[..., : CONTACTS.start]
+    error = (output - target)[..., : CONTACTS.start]
+    deviation, change, jitter = scales
     p_target = toes.positions(target, robot)
     p_output = toes.positions(output, robot)
     v_target = toes.velocities(target, p_target, robot)
     v_output = toes.velocities(output, p_output, robot)
     return {
-        "features": error.square().mean(),
-        "speeds": error.diff(dim=1).square().mean() * 10,
-        "accelerations": error.diff(n=2, dim=1).square().mean() * 20,
+        "features": (error / deviation).square().mean(),
+        "changes": (error.diff(dim=1) / change).square().mean(),
+        "jitter": (error.diff(n=2, dim=1) / jitter).square().mean(),
         "toes": ((p_output - p_target) / TOE_SCALE).square().mean(),
         "toe_speeds": ((v_output - v_target) / TOE_SPEED_SCALE).square().mean(),
         "contacts": functional.binary_cross_entropy_with_logits(

@@ -52,8 +52,10 @@ class PairedWindows:
 
     def __call__(
         self, random: np.random.Generator, count: int
-    ) -> tuple[Tensor, Tensor]:
-        """Returns windows (N, WINDOW, SIZE) and their robots (N,).
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Returns windows (N, WINDOW, SIZE), their robots (N,) and their labels (N,).
+
+        Labels are indices into gaits.LABELS.
 
         N is ``count``; or twice as many if there are clips of several robots: then the
         second half are the same windows of other robots.
@@ -71,6 +73,7 @@ class PairedWindows:
         return (
             torch.tensor(np.stack(frames), dtype=torch.float32),
             torch.tensor([self._robots.index(clip.robot) for clip in chosen]),
+            torch.tensor([clip.label.index for clip in chosen]),
         )
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from loco_drake.gaits import parse_label
 from loco_drake.generation import features as ft
 from loco_drake.generation.library import motion_clip
 from loco_drake.generation.windows import WINDOW, PairedWindows
@@ -28,8 +29,9 @@ def clips():
 
 def test_the_second_half_is_what_another_robot_does_then(clips):
     windows = PairedWindows(clips, ROBOTS)
-    frames, robot = windows(np.random.default_rng(0), 40)
+    frames, robot, label = windows(np.random.default_rng(0), 40)
     assert frames.shape == (80, WINDOW, ft.SIZE)
+    assert set(label.tolist()) == {parse_label("dog-trot").index}
     one, other = frames.chunk(2)
     robot_one, robot_other = robot.chunk(2)
     alone = torch.isclose(one[:, :, 0].mean(dim=1), torch.tensor(0.4 / 0.3), atol=0.2)
@@ -47,7 +49,7 @@ def test_the_second_half_is_what_another_robot_does_then(clips):
 
 def test_one_robot_has_no_other_half(clips):
     alone = [c for c in clips if c.robot == "go2"]
-    frames, robot = PairedWindows(alone, ROBOTS)(np.random.default_rng(0), 8)
+    frames, robot, _ = PairedWindows(alone, ROBOTS)(np.random.default_rng(0), 8)
     assert len(frames) == 8
     assert robot.tolist() == [1] * 8
 
@@ -55,5 +57,5 @@ def test_one_robot_has_no_other_half(clips):
 def test_clips_of_which_nothing_is_known_are_not_paired():
     """Without a recording's name no one can tell that they are the same."""
     unknown = [clip(robot, file="") for robot in ROBOTS]
-    frames, _ = PairedWindows(unknown, ROBOTS)(np.random.default_rng(0), 8)
+    frames, *_ = PairedWindows(unknown, ROBOTS)(np.random.default_rng(0), 8)
     assert len(frames) == 8
