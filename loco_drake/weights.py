@@ -1,8 +1,9 @@
 """Network weights on disk: safetensors whose header says what they are."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -12,6 +13,8 @@ from loco_drake.errors import InputError
 from loco_drake.files import atomic_path
 
 FORMAT_VERSION = 1
+
+Network = TypeVar("Network", bound=torch.nn.Module)
 
 
 def save_weights(
@@ -95,3 +98,27 @@ def load_into(
         raise InputError(
             f"The weights in {path} do not fit the network that their header describes."
         ) from None
+
+
+def load_network(
+    path: Path, kind: str, build: Callable[[dict[str, Any]], Network]
+) -> Network:
+    """Returns the network of a weights file, ready for inference.
+
+    Args:
+        path: of the file.
+        kind: what it must hold.
+        build: returns the network, of any weights, from the "network" of the config.
+
+    Raises:
+        InputError: if the file is missing, damaged, or of something else.
+    """
+    tensors, config = load_weights(path, kind)
+    try:
+        network = build(dict(config["network"]))
+    except (KeyError, TypeError, ValueError):
+        raise InputError(f"{path} has a damaged {kind} header.") from None
+    load_into(network, tensors, path)
+    network.eval()
+    network.requires_grad_(False)
+    return network

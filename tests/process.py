@@ -5,6 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+# First line of scripts that are to be interrupted: shells start what they run in the
+# background deaf to Ctrl-C, and these tests may be run so.
+HEAR_CTRL_C = "import signal; signal.signal(2, signal.default_int_handler)\n"
+
 
 def run_python(*arguments: object, cwd: Path, **environment: str) -> str:
     """Returns what ``python ARGUMENTS`` prints; it must succeed.

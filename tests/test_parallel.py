@@ -8,6 +8,7 @@ import pytest
 
 from loco_drake.errors import InputError
 from loco_drake.parallel import map_in_workers
+from tests.process import HEAR_CTRL_C
 
 _MADE = []
 
@@ -68,7 +69,7 @@ if __name__ == "__main__":
 def test_ctrl_c_ends_the_workers(tmp_path):
     """Both workers are gone soon after, without a traceback of theirs."""
     script = tmp_path / "script.py"
-    script.write_text(SCRIPT)
+    script.write_text(HEAR_CTRL_C + SCRIPT)
     process = subprocess.Popen(
         [sys.executable, str(script)],
         stdout=subprocess.PIPE,

@@ -10,12 +10,12 @@ from loco_drake.generation.train_tokenizer import LearningTokenizer
 from loco_drake.models.robots import get_robot
 
 
-def make_tiny_model() -> MotionModel:
-    """Returns untrained networks that write wild but bounded motion."""
+def make_tiny_model(robots: tuple[str, ...] = ("go2",)) -> MotionModel:
+    """Returns untrained networks that write wild but bounded motion of the first."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(3)
         config = TokenizerConfig(
-            width=16, depth=2, frame_width=8, books=2, book_size=16
+            robots=robots, width=16, depth=2, frame_width=8, books=2, book_size=16
         )
         tokenizer = Tokenizer(config)
         learning = LearningTokenizer(tokenizer)
@@ -40,4 +40,4 @@ def make_tiny_model() -> MotionModel:
                 heads=2,
             )
         )
-    return MotionModel(tokenizer, generator.eval(), "go2")
+    return MotionModel(tokenizer, generator.eval(), robots[0])

@@ -1,6 +1,5 @@
 """The command ``evaluate retargeting``."""
 
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import Progress
 
-from loco_drake.cli.output import print_failed, print_table, write_json
+from loco_drake.cli.output import print_failed, print_figures, write_json
 from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments, select_labels
 from loco_drake.errors import InputError, check_choice
@@ -71,7 +70,12 @@ class EvaluateRetargeting:
         for name, result in robots.items():
             speed = result["frames_per_second"] or 0.0
             title = f"{name}: {speed:.0f} frames/s in one process"
-            print_table(title, list(_COLUMNS), _rows(result))
+            rows = {
+                **result["labels"],
+                "all of these": result["all"],
+                **result["other"],
+            }
+            print_figures(title, "label", _COLUMNS, rows)
         failed = [
             item for result in robots.values() for item in result["failed"].items()
         ]
@@ -79,9 +83,8 @@ class EvaluateRetargeting:
         return 1 if failed else 0
 
 
-# Column: key, factor, digits.
+# Title: key, factor, digits.
 _COLUMNS = {
-    "label": ("", 1, 0),
     "clips": ("clips", 1, 0),
     "slip mm/s": ("stance_slip_median_mps", 1000, 2),
     "sunk mm": ("penetration_max_m", 1000, 2),
@@ -93,13 +96,3 @@ _COLUMNS = {
     "lag % of stride": ("phase_lag_error", 100, 2),
     "duty %": ("duty_factor_error", 100, 1),
 }
-
-
-def _rows(result: dict[str, Any]) -> Iterator[list[str]]:
-    named = {**result["labels"], "all of these": result["all"], **result["other"]}
-    for name, figures in named.items():
-        row = [name]
-        for key, factor, digits in list(_COLUMNS.values())[1:]:
-            value = figures[key]
-            row.append("-" if value is None else f"{value * factor:.{digits}f}")
-        yield row

@@ -27,10 +27,25 @@ _COMMANDS = {
         "the GPT that writes them",
     ),
     "train tracker": ("train_tracker", "TrainTracker", "the policy, by PPO"),
+    "train classifier": (
+        "train_classifier",
+        "TrainClassifier",
+        "what tells gaits apart, to judge generated motion",
+    ),
     "evaluate retargeting": (
         "evaluate_retargeting",
         "EvaluateRetargeting",
         "how well recordings become motion of a robot",
+    ),
+    "evaluate tokenizer": (
+        "evaluate_tokenizer",
+        "EvaluateTokenizer",
+        "how well motion survives the way to tokens and back",
+    ),
+    "evaluate generation": (
+        "evaluate_generation",
+        "EvaluateGeneration",
+        "how generated motion compares with recorded motion",
     ),
     "evaluate tracking": (
         "evaluate_tracking",

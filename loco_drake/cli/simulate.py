@@ -74,9 +74,7 @@ class Simulate:
         if motion is not None:
             duration = min(duration, motion.duration)
         # The first evaluation of the networks sets up torch.
-        recorder.locomotion.GetOutputPort("action").Eval(
-            recorder.locomotion.GetMyContextFromRoot(recorder.context)
-        )
+        recorder.diagram.GetOutputPort("action").Eval(recorder.context)
         start = time.perf_counter()
 
         def pace(now: float) -> None:

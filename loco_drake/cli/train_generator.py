@@ -25,8 +25,8 @@ class TrainGenerator:
     Ctrl-C saves a checkpoint and stops; --resume goes on from it.
     """
 
-    motions: Path = Path("motions/go2")
-    """Folder of Motion files, those that the tokenizer was trained on."""
+    motions: tuple[Path, ...] = (Path("motions/go2"),)
+    """Folders of Motion files, those that the tokenizer was trained on."""
     tokenizer: Path = Path("runs/tokenizer/tokenizer.safetensors")
     """Weights from `train tokenizer`."""
     out: Path = Path("runs/generator")
@@ -56,7 +56,7 @@ class TrainGenerator:
         check_steps(self.steps, self.learning_rate)
         if self.stitched < 1:
             raise InputError(f"--stitched must be 1 or more, not {self.stitched}.")
-        library = load_library(self.motions)
+        library = load_library(*self.motions)
         tokenizer = load_tokenizer(self.tokenizer)
         if not 1 <= self.books <= tokenizer.config.books:
             raise InputError(

@@ -8,11 +8,8 @@ from loco_drake.cli.output import print_table, write_json
 from loco_drake.cli.training import check_steps, print_stopped
 from loco_drake.generation.library import load_library
 from loco_drake.generation.tokenizer import TokenizerConfig
-from loco_drake.generation.train_tokenizer import (
-    codebook_use,
-    score_tokenizer,
-    train_tokenizer,
-)
+from loco_drake.generation.tokenizer_score import codebook_use, score_tokenizer
+from loco_drake.generation.train_tokenizer import train_tokenizer
 from loco_drake.generation.training import LoopSettings
 
 
@@ -23,9 +20,9 @@ class TrainTokenizer:
     Ctrl-C saves a checkpoint and stops; --resume goes on from it.
     """
 
-    motions: Path = Path("motions/go2")
-    """Folder of Motion files, such as `retarget` writes; those for validation are held
-    out to test on."""
+    motions: tuple[Path, ...] = (Path("motions/go2"),)
+    """Folders of Motion files, such as `retarget` writes, one for each robot; those for
+    validation are held out to test on."""
     out: Path = Path("runs/tokenizer")
     """Folder for the weights (tokenizer.safetensors), checkpoint and logs."""
     steps: int = 6000
@@ -46,7 +43,7 @@ class TrainTokenizer:
             InputError: if an option is wrong.
         """
         check_steps(self.steps, self.learning_rate)
-        library = load_library(self.motions)
+        library = load_library(*self.motions)
         settings = LoopSettings(
             out=self.out,
             steps=self.steps,

@@ -4,15 +4,10 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import (
-    Context,
-    Diagram,
-    DiagramBuilder,
-    EventStatus,
-)
-from pydrake.systems.primitives import LogVectorOutput
+from pydrake.systems.framework import Context, EventStatus
 
 from loco_drake.evaluation.tracking import Rollout
 from loco_drake.models.plant import ConfigureSimulator
@@ -22,47 +17,43 @@ from loco_drake.systems.fall import has_fallen
 from loco_drake.systems.plan import PLAN_DT, Plan
 from loco_drake.systems.scenario import Scenario
 
-_LOGGED = ("state", "plan_state", "path_time", "desired_state", "reward_terms")
+_RECORDED = ("state", "plan_state", "path_time", "desired_state", "reward_terms")
 
 
 class Recorder:
-    """The locomotion diagram with logs, to be simulated any number of times.
+    """The locomotion diagram, to be simulated any number of times.
+
+    Its output ports are read after every control period. There is no diagram around it
+    with loggers: Drake's CENIC looks for the plant among the root's own systems.
 
     Args:
         scenario: what to simulate.
         meshcat: where to draw it, if anywhere.
 
     Attributes:
-        diagram: the locomotion diagram and its logs.
-        locomotion: the locomotion diagram itself.
+        diagram: the locomotion diagram.
         simulator: of ``diagram``.
     """
 
     def __init__(self, scenario: Scenario, meshcat: Meshcat | None = None) -> None:
         self._robot = get_robot(scenario.robot)
-        builder = DiagramBuilder()
-        self.locomotion = builder.AddSystem(
-            MakeLocomotionDiagram(scenario, meshcat=meshcat)
-        )
-        self._logs = {
-            name: LogVectorOutput(self.locomotion.GetOutputPort(name), builder, PLAN_DT)
-            for name in _LOGGED
-        }
-        self.diagram: Diagram = builder.Build()
+        self.diagram = MakeLocomotionDiagram(scenario, meshcat=meshcat)
         self.simulator = Simulator(self.diagram)
         ConfigureSimulator(self.simulator, scenario.plant)
-        self._plant = self.locomotion.GetSubsystemByName("plant")
+        self._ports = [self.diagram.GetOutputPort(name) for name in _RECORDED]
+        self._plant = self.diagram.GetSubsystemByName("plant")
+        self._samples: list[list[NDArray[np.float64]]] = []
         self._fell = False
 
     @property
     def context(self) -> Context:
-        """The root context."""
+        """The diagram's context."""
         return self.simulator.get_mutable_context()
 
     def start(
         self, *, gait: str | None = None, seed: int = 0, plan: Plan | None = None
     ) -> None:
-        """Puts the clock to 0, the robot on its plan and empties the logs.
+        """Puts the clock to 0, the robot on its plan and forgets what was recorded.
 
         Args:
             gait: of a generated reference, instead of the scenario's.
@@ -73,17 +64,14 @@ class Recorder:
         self.simulator.clear_monitor()
         self.diagram.SetDefaultContext(self.context)
         self.context.SetTime(0.0)
-        reference = self.locomotion.GetSubsystemByName("reference")
+        reference = self.diagram.GetSubsystemByName("reference")
         context = reference.GetMyMutableContextFromRoot(self.context)
         if gait is not None:
             reference.SetReference(context, gait=gait, seed=seed)
         if plan is not None:
             reference.SetPlan(context, plan)
-        StartOnPlan(self.simulator, self.locomotion)
-        for log in self._logs.values():
-            log.FindMutableLog(self.context).Clear()
-        # Initialize published the first sample; it is wanted in the cleared logs too.
-        self.simulator.Initialize()
+        StartOnPlan(self.simulator)
+        self._samples = [self._sample()]
         self.simulator.set_monitor(self._monitor)
 
     def run(
@@ -106,22 +94,25 @@ class Recorder:
             wall += time.perf_counter() - start
             if self._fell:
                 break
+            self._samples.append(self._sample())
             if after_step is not None:
                 after_step(step * PLAN_DT)
-        data = {
-            name: log.FindLog(self.context).data().T.copy()
-            for name, log in self._logs.items()
-        }
+        state, plan_state, path_time, desired_state, reward_terms = (
+            np.array(samples) for samples in zip(*self._samples, strict=True)
+        )
         rollout = Rollout(
-            state=data["state"],
-            plan_state=data["plan_state"],
-            path_time=data["path_time"][:, 0],
-            desired_joints=data["desired_state"][:, :12],
-            reward=data["reward_terms"].sum(axis=1),
+            state=state,
+            plan_state=plan_state,
+            path_time=path_time[:, 0],
+            desired_joints=desired_state[:, :12],
+            reward=reward_terms.sum(axis=1),
             steps=steps,
             fell=self._fell,
         )
         return rollout, wall
+
+    def _sample(self) -> list[NDArray[np.float64]]:
+        return [port.Eval(self.context) for port in self._ports]
 
     def _monitor(self, root: Context) -> EventStatus:
         context = self._plant.GetMyContextFromRoot(root)

@@ -15,10 +15,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from loco_drake.errors import InputError
 from loco_drake.gaits import ONE_HOT, ONE_HOT_SIZE
 from loco_drake.generation.layers import RotaryAttention
-from loco_drake.weights import load_into, load_weights, save_weights
+from loco_drake.weights import load_network, save_weights
 
 # Durations are binned on a log scale; the last bin is "long" and never ends.
 DURATION_BINS = 16
@@ -273,12 +272,10 @@ def load_generator(path: Path) -> Generator:
     Raises:
         InputError: if the file is missing, damaged, or of something else.
     """
-    tensors, config = load_weights(path, "generator")
-    try:
-        network = dict(config["network"])
-        network["labels"] = tuple(network["labels"])
-        generator = Generator(GeneratorConfig(**network))
-    except (KeyError, TypeError, ValueError):
-        raise InputError(f"{path} has a damaged generator header.") from None
-    load_into(generator, tensors, path)
-    return generator.eval().requires_grad_(False)
+
+    def build(network: dict[str, Any]) -> Generator:
+        return Generator(
+            GeneratorConfig(**{**network, "labels": tuple(network["labels"])})
+        )
+
+    return load_network(path, "generator", build)

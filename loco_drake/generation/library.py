@@ -27,12 +27,15 @@ class Clip:
         recording: the recording that the motion is of, and the animal if it is known;
             clips of one can overlap and are never on both sides of the split.
         features: see :mod:`loco_drake.generation.features`, shape (T, SIZE).
+        performance: file and frames, and whether mirrored: the same for all robots that
+            were given this stretch to follow; empty if nothing is known.
     """
 
     robot: str
     label: GaitLabel
     recording: str
     features: Array
+    performance: str = ""
 
     def __len__(self) -> int:
         return len(self.features)
@@ -62,49 +65,53 @@ class Library:
         return tuple(sorted({clip.robot for clip in self.train}))
 
 
-def load_library(folder: Path) -> Library:
-    """Reads every Motion file under ``folder``.
+def load_library(*folders: Path) -> Library:
+    """Reads every Motion file under the folders.
 
     The split is the one that ``loco-drake retarget`` wrote into the files
     (:mod:`loco_drake.datasets.split`); motions without one are for training. Those
     whose label is not one of the fifteen are left out.
 
     Args:
-        folder: holds ``*.npz``, in subfolders too.
+        folders: hold ``*.npz``, in subfolders too; such as one for each robot.
 
     Raises:
         InputError: if there are no motions with a label to train on, one is unsound, or
             a recording is on both sides of the split.
     """
-    folder = Path(folder)
-    paths = sorted(folder.rglob("*.npz")) if folder.is_dir() else []
+    where = ", ".join(repr(str(folder)) for folder in folders)
+    for folder in folders:
+        if not Path(folder).is_dir():
+            raise InputError(f"There is no folder of Motion files {str(folder)!r}.")
+    paths = [path for folder in folders for path in sorted(folder.rglob("*.npz"))]
     motions = [(path, load_motion(path)) for path in paths]
     motions = [(path, motion) for path, motion in motions if motion.label in LABELS]
     if not motions:
         raise InputError(
             f"There are no Motion files (*.npz) with one of the labels "
-            f"{', '.join(map(str, LABELS))} in {str(folder)!r}."
+            f"{', '.join(map(str, LABELS))} in {where}."
         )
     train, mirrors, held_out = [], [], []
     for path, motion in motions:
-        clip = _clip(motion, str(path))
+        clip = motion_clip(motion, str(path))
         if motion.provenance.get("split") == VALIDATION:
             held_out.append(clip)
         else:
             train.append(clip)
-            mirrors.append(_clip(motion.mirrored(), str(path)))
+            mirrors.append(motion_clip(motion.mirrored(), str(path)))
     if not train:
-        raise InputError(f"All motions in {str(folder)!r} are for validation.")
+        raise InputError(f"All motions in {where} are for validation.")
     both = {clip.recording for clip in train} & {clip.recording for clip in held_out}
     if both:
         raise InputError(
-            f"Motions of {min(both)} in {str(folder)!r} are for training and for "
+            f"Motions of {min(both)} in {where} are for training and for "
             "validation: retarget all of them with the same --seed."
         )
     return Library(train=(*train, *mirrors), held_out=tuple(held_out))
 
 
-def _clip(motion: Motion, path: str) -> Clip:
+def motion_clip(motion: Motion, path: str = "") -> Clip:
+    """Returns a motion as a clip; ``path`` names a recording that has no other name."""
     robot = get_robot(motion.robot)
     origin = motion.provenance
     recording = origin.get("animal") or origin.get("recording", path)
@@ -113,7 +120,16 @@ def _clip(motion: Motion, path: str) -> Clip:
         label=motion.label,
         recording=f"{motion.source}-{recording}",
         features=motion_features(robot, motion),
+        performance=_performance(motion),
     )
+
+
+def _performance(motion: Motion) -> str:
+    origin = motion.provenance
+    if "file" not in origin or "frames" not in origin:
+        return ""
+    parts = (origin["file"], origin["frames"], origin.get("mirrored", ""))
+    return " ".join((str(motion.label), *parts))
 
 
 class Sampler:

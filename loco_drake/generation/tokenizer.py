@@ -14,10 +14,9 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from loco_drake.errors import InputError
 from loco_drake.generation.features import CONTACTS, SIZE
 from loco_drake.generation.layers import ConvBlock
-from loco_drake.weights import load_into, load_weights, save_weights
+from loco_drake.weights import load_network, save_weights
 
 
 @dataclass(frozen=True)
@@ -166,12 +165,10 @@ def load_tokenizer(path: Path) -> Tokenizer:
     Raises:
         InputError: if the file is missing, damaged, or of something else.
     """
-    tensors, config = load_weights(path, "tokenizer")
-    try:
-        network = dict(config["network"])
-        network["robots"] = tuple(network["robots"])
-        tokenizer = Tokenizer(TokenizerConfig(**network))
-    except (KeyError, TypeError, ValueError):
-        raise InputError(f"{path} has a damaged tokenizer header.") from None
-    load_into(tokenizer, tensors, path)
-    return tokenizer.eval().requires_grad_(False)
+
+    def build(network: dict[str, Any]) -> Tokenizer:
+        return Tokenizer(
+            TokenizerConfig(**{**network, "robots": tuple(network["robots"])})
+        )
+
+    return load_network(path, "tokenizer", build)

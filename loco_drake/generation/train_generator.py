@@ -23,7 +23,7 @@ from loco_drake.generation.generator import (
 from loco_drake.generation.library import Clip, Library
 from loco_drake.generation.stitching import Stitcher
 from loco_drake.generation.tokenizer import Tokenizer
-from loco_drake.generation.train_tokenizer import clip_tensor
+from loco_drake.generation.tokenizer_score import clip_tensor
 from loco_drake.generation.training import LoopResult, LoopSettings, train
 from loco_drake.motion import FPS
 

@@ -1,4 +1,4 @@
-"""Training of the tokenizer on windows of clips, and its score.
+"""Training of the tokenizer on windows of clips.
 
 The codebooks follow exponential moving averages of what they stand for, and codes
 that nothing is near to are taken from the batch anew, both by
@@ -7,59 +7,81 @@ makes the best of the coarse ones alone.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 from torch import Tensor, nn
 from torch.nn import functional
 from vector_quantize_pytorch import ResidualVQ
 
 from loco_drake.errors import InputError
-from loco_drake.generation.determinism import single_thread
-from loco_drake.generation.features import CONTACTS, JOINTS, VELOCITY, YAW_RATE
-from loco_drake.generation.library import Clip, Library, Sampler
+from loco_drake.gaits import LABELS
+from loco_drake.generation.features import CONTACTS
+from loco_drake.generation.library import Clip, Library
 from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
 from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.generation.windows import WINDOW, PairedWindows
 from loco_drake.models.robots import get_robot
 
 Array = NDArray[np.float64]
 
-WINDOW = 64  # frames
 BATCH = 32  # windows
 FEWEST_BOOKS = 2  # batches are decoded from between so many and all of the books
-TEMPO = 1.15  # windows are played at most this much faster or slower
 
-# Weights of the losses; each is scaled to be about 1 before training.
+# Weights of the losses; each is about 1 before training.
 WEIGHTS = {
-    "features": 1.0,  # squared error in standard deviations
-    "speeds": 0.5,  # ... of its change from frame to frame
-    "accelerations": 0.5,  # ... of the change of that
+    "features": 1.0,  # squared error, see Scales
+    "changes": 0.25,  # ... of the change from frame to frame
+    "jitter": 0.1,  # ... of the change of that
     "toes": 1.0,  # squared error of toe positions, in units of TOE_SCALE
     "toe_speeds": 0.5,  # ... of their velocities over the ground, TOE_SPEED_SCALE
     "contacts": 0.2,  # cross-entropy
     "commitment": 0.25,
 }
+LEAST_SHARE = 0.1  # of a label's scale in that of all
+LEAST_SCALES = (0.02, 0.005, 0.002)  # of deviation, change, jitter: rad, stand heights
 TOE_SCALE = 0.05  # m
 TOE_SPEED_SCALE = 0.5  # m/s
 
 
-@dataclass(frozen=True)
-class TokenizerScore:
-    """How well a tokenizer gives back what it was given.
+class Scales:
+    """How much features vary, by label: the unit of their errors.
 
-    Attributes:
-        joint_rmse_rad: over frames and joints.
-        toe_error_rmse_m: Euclidean distance of the toe spheres' centres, relative to
-            the ground under the trunk, over frames and toes.
+    The trunk of a walking horse moves so evenly that, in units of what lies between a
+    walk and a gallop, any jitter of it would be free.
+
+    Args:
+        clips: to measure; a label that none has gets the scales of all.
     """
 
-    joint_rmse_rad: float
-    toe_error_rmse_m: float
+    def __init__(self, clips: Sequence[Clip]) -> None:
+        by_label: dict[int, list[Array]] = {}
+        for clip in clips:
+            features = clip.features[:, : CONTACTS.start]
+            by_label.setdefault(clip.label.index, []).append(features)
+        own = {label: _variances(features) for label, features in by_label.items()}
+        everything: Array = np.mean(list(own.values()), axis=0)
+        table = np.stack([own.get(i, everything) for i in range(len(LABELS))])
+        # What hardly varies at all must not become the loudest of all.
+        scales = np.sqrt(np.maximum(table, LEAST_SHARE**2 * everything))
+        scales = np.maximum(scales, np.array(LEAST_SCALES)[:, None])
+        self._scales = torch.tensor(scales, dtype=torch.float32)  # (labels, 3, ...)
+
+    def __call__(self, label: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Returns those of deviations, changes and jitter, (N, 1, ...), for (N,)."""
+        deviation, change, jitter = self._scales[label].unbind(dim=1)
+        return deviation[:, None], change[:, None], jitter[:, None]
+
+
+def _variances(clips: Sequence[Array]) -> Array:
+    """Returns those of (T, N) about their mean, and mean squares of changes, (3, N)."""
+    orders = [np.concatenate([np.diff(x, n=n, axis=0) for x in clips]) for n in (1, 2)]
+    squares = [np.square(order).mean(axis=0) for order in orders]
+    return np.stack((np.concatenate(clips).var(axis=0), *squares))
 
 
 class LearningTokenizer(nn.Module):
@@ -84,19 +106,27 @@ class LearningTokenizer(nn.Module):
             quantize_dropout_cutoff_index=FEWEST_BOOKS - 1,
         )
 
-    def forward(self, features: Tensor, robot: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(
+        self, features: Tensor, robot: Tensor, decoded_for: Tensor | None = None
+    ) -> tuple[Tensor, Tensor]:
         """Encodes, quantizes and decodes features (B, T, SIZE).
 
         Args:
             features: frames, whole tokens of them.
             robot: index of each window's robot, shape (B,).
+            decoded_for: robots to decode the tokens for, shape (R * B,): first one for
+                each window, then a second for each, and so on. None: the windows' own.
 
         Returns:
-            Reconstruction with contacts as logits, and the commitment loss.
+            Reconstructions (R * B, T, SIZE) with contacts as logits, and the commitment
+            loss.
         """
+        decoded_for = robot if decoded_for is None else decoded_for
         embedded = self.tokenizer.embed(features, robot)
         quantized, _, commitment = self.quantizer(embedded)
-        return self.tokenizer.decode_embedded(quantized, robot), commitment.mean()
+        repeated = quantized.repeat(len(decoded_for) // len(robot), 1, 1)
+        output = self.tokenizer.decode_embedded(repeated, decoded_for)
+        return output, commitment.mean()
 
     def finish(self) -> Tokenizer:
         """Returns the tokenizer with the codebooks as they are now."""
@@ -122,18 +152,18 @@ def train_tokenizer(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
         learning = LearningTokenizer(Tokenizer(config))
+    with torch.no_grad():
+        # To begin with a still picture: first to unlearn jitter kills most codes.
+        learning.tokenizer.decoder_out.weight.mul_(0.01)
     frames = np.concatenate([clip.features for clip in clips])
     learning.tokenizer.set_statistics(torch.tensor(frames, dtype=torch.float32))
     toes = Toes([get_robot(name) for name in config.robots])
-    sampler = Sampler(clips)
-    curves = {clip: CubicSpline(np.arange(len(clip)), clip.features) for clip in clips}
+    windows = PairedWindows(clips, config.robots)
+    scales = Scales(clips)
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
-        chosen = [clips[i] for i in sampler(random, BATCH)]
-        windows = [cut_window(curves[clip], random) for clip in chosen]
-        target = torch.tensor(np.stack(windows), dtype=torch.float32)
-        robot = torch.tensor([config.robots.index(clip.robot) for clip in chosen])
-        losses = tokenizer_losses(learning, toes, target, robot)
+        target, robot, label = windows(random, BATCH)
+        losses = tokenizer_losses(learning, toes, scales(label), target, robot, BATCH)
         total = sum(
             (WEIGHTS[name] * loss for name, loss in losses.items()), torch.zeros(())
         )
@@ -148,48 +178,37 @@ def train_tokenizer(
     return tokenizer, result
 
 
-def cut_window(curve: CubicSpline, random: np.random.Generator) -> Array:
-    """Returns WINDOW frames from anywhere in a clip, a little faster or slower.
-
-    Feet that stand still do so at any tempo.
-
-    Args:
-        curve: the features of a clip over its frame numbers.
-        random: decides where and how fast.
-    """
-    last = curve.x[-1]
-    fastest = min(TEMPO, last / (WINDOW - 1))
-    tempo = min(TEMPO ** random.uniform(-1, 1), fastest)
-    start = random.uniform(0, last - tempo * (WINDOW - 1))
-    window: Array = curve(start + tempo * np.arange(WINDOW))
-    window[:, VELOCITY] *= tempo
-    window[:, YAW_RATE] *= tempo
-    window[:, CONTACTS] = window[:, CONTACTS] > 0.5
-    return window
-
-
 def tokenizer_losses(
-    learning: LearningTokenizer, toes: Toes, target: Tensor, robot: Tensor
+    learning: LearningTokenizer,
+    toes: Toes,
+    scales: tuple[Tensor, Tensor, Tensor],
+    target: Tensor,
+    robot: Tensor,
+    encoded: int,
 ) -> dict[str, Tensor]:
     """Returns the losses of a batch, unweighted; see :data:`WEIGHTS`.
 
     Args:
         learning: in training mode its codebooks are updated.
         toes: of the tokenizer's robots.
-        target: features, shape (B, T, SIZE).
-        robot: index of each window's robot, shape (B,).
+        scales: of the windows, see :class:`Scales`.
+        target: features, shape (N, T, SIZE).
+        robot: index of each window's robot, shape (N,).
+        encoded: how many windows are encoded, the first ones; all are what is to come
+            out when their tokens are decoded, see :class:`PairedWindows`.
     """
-    output, commitment = learning(target, robot)
+    output, commitment = learning(target[:encoded], robot[:encoded], robot)
     contacts = output[..., CONTACTS]
-    error = ((output - target) / learning.tokenizer.std)[..., : CONTACTS.start]
+    error = (output - target)[..., : CONTACTS.start]
+    deviation, change, jitter = scales
     p_target = toes.positions(target, robot)
     p_output = toes.positions(output, robot)
     v_target = toes.velocities(target, p_target, robot)
     v_output = toes.velocities(output, p_output, robot)
     return {
-        "features": error.square().mean(),
-        "speeds": error.diff(dim=1).square().mean() * 10,
-        "accelerations": error.diff(n=2, dim=1).square().mean() * 20,
+        "features": (error / deviation).square().mean(),
+        "changes": (error.diff(dim=1) / change).square().mean(),
+        "jitter": (error.diff(n=2, dim=1) / jitter).square().mean(),
         "toes": ((p_output - p_target) / TOE_SCALE).square().mean(),
         "toe_speeds": ((v_output - v_target) / TOE_SPEED_SCALE).square().mean(),
         "contacts": functional.binary_cross_entropy_with_logits(
@@ -197,39 +216,3 @@ def tokenizer_losses(
         ),
         "commitment": commitment,
     }
-
-
-def score_tokenizer(tokenizer: Tokenizer, clips: Sequence[Clip]) -> TokenizerScore:
-    """Returns how well whole clips survive the way to tokens and back."""
-    toes = Toes([get_robot(name) for name in tokenizer.config.robots])
-    joints, distances = [], []
-    for clip in clips:
-        target = clip_tensor(tokenizer, clip)
-        robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
-        with torch.inference_mode(), single_thread():
-            output = tokenizer.decode(tokenizer.encode(target, robot), robot)
-            apart = toes.positions(output, robot) - toes.positions(target, robot)
-        joints.append((output - target)[..., JOINTS].square().flatten())
-        distances.append(apart.square().sum(dim=-1).flatten())
-    return TokenizerScore(
-        joint_rmse_rad=float(torch.cat(joints).mean().sqrt()),
-        toe_error_rmse_m=float(torch.cat(distances).mean().sqrt()),
-    )
-
-
-def codebook_use(tokenizer: Tokenizer, clips: Sequence[Clip]) -> float:
-    """Returns the share of all books' codes that the clips need, in [0, 1]."""
-    used = torch.zeros(tokenizer.config.books, tokenizer.config.book_size)
-    for clip in clips:
-        robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
-        with torch.inference_mode(), single_thread():
-            codes = tokenizer.encode(clip_tensor(tokenizer, clip), robot)[0]
-        used[torch.arange(tokenizer.config.books), codes] = 1.0
-    return float(used.mean())
-
-
-def clip_tensor(tokenizer: Tokenizer, clip: Clip, start: int = 0) -> Tensor:
-    """Returns a clip's features from ``start`` on, in whole tokens, (1, T, SIZE)."""
-    tokens = (len(clip) - start) // tokenizer.config.frames_per_token
-    end = start + tokens * tokenizer.config.frames_per_token
-    return torch.tensor(clip.features[None, start:end], dtype=torch.float32)

@@ -16,6 +16,7 @@ from loco_drake.cli.main import main
 from loco_drake.datasets import manifest, segment_table
 from loco_drake.datasets.registry import DATASETS
 from tests.mirror_server import serve
+from tests.process import HEAR_CTRL_C
 from tests.synthetic import write_data_folder
 
 GAITS = ("pace", "trot", "gallop")
@@ -161,7 +162,7 @@ def test_ctrl_c_leaves_whole_files_only(mirror, tmp_path):
         server.stalled.add(FILES[1])
         arguments = [str(manifest.MANIFEST), server.url]
         with subprocess.Popen(
-            [sys.executable, "-c", INTERRUPTED, *arguments],
+            [sys.executable, "-c", HEAR_CTRL_C + INTERRUPTED, *arguments],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,

@@ -72,6 +72,16 @@ def test_one_seed_gives_one_outcome_another_seed_another(weights, tmp_path):
     assert figures(1) == figures(1) != figures(2)
 
 
+@pytest.mark.parametrize("contact", ["cenic", "lagged", "sap"])
+def test_other_solvers_can_be_chosen(weights, tmp_path, contact):
+    """All see the same robot: it goes about as far in .4 s as with the default."""
+    line = ("--duration", 0.4, "--no-meshcat", "--policy", weights / "calm.safetensors")
+    default = simulate(tmp_path, *line)
+    other = simulate(tmp_path, *line, "--contact", contact)
+    assert other["speed_mps"] == pytest.approx(default["speed_mps"], rel=0.1)
+    assert other["joint_rmse_rad"] != default["joint_rmse_rad"]
+
+
 def test_a_fall_is_a_result(weights, tmp_path):
     """Status 0, and the steps that were not made count as lost."""
     policy = weights / "wild.safetensors"

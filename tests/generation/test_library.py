@@ -72,8 +72,8 @@ def test_labels_are_drawn_by_the_square_root_of_their_time():
 
 
 def test_a_folder_without_motions_is_refused(tmp_path, make_synthetic):
-    with pytest.raises(InputError, match="no Motion files"):
-        load_library(tmp_path / "missing")
+    with pytest.raises(InputError, match=r"no folder of Motion files '.*missing'"):
+        load_library(tmp_path, tmp_path / "missing")
     with pytest.raises(InputError, match="no Motion files"):
         load_library(tmp_path)
     (tmp_path / "bad.npz").write_bytes(b"nothing")
@@ -85,3 +85,14 @@ def test_motions_without_one_of_the_labels_are_left_out(tmp_path, make_synthetic
     save_motion(make_synthetic(), tmp_path / "a.npz")
     save_motion(replace(make_synthetic(), gait="turn_left"), tmp_path / "b.npz")
     assert len(load_library(tmp_path).train) == 2
+
+
+def test_a_folder_for_each_robot(tmp_path, make_synthetic):
+    for name in ("go2", "a1"):
+        save_motion(make_synthetic(name=name), tmp_path / name / "a.npz")
+    library = load_library(tmp_path / "go2", tmp_path / "a1")
+    assert library.robots == ("a1", "go2")
+    for name in ("empty", "other"):
+        (tmp_path / name).mkdir()
+    with pytest.raises(InputError, match=r"no Motion files .*empty', '.*other'"):
+        load_library(tmp_path / "empty", tmp_path / "other")

@@ -7,14 +7,17 @@ import pytest
 import torch
 
 from loco_drake.errors import InputError
+from loco_drake.gaits import parse_label
+from loco_drake.generation.features import SIZE
 from loco_drake.generation.generator import (
     GeneratorConfig,
     duration_bin,
     load_generator,
 )
-from loco_drake.generation.library import load_library
+from loco_drake.generation.library import Clip, load_library
 from loco_drake.generation.motion_model import MotionModel
 from loco_drake.generation.tokenizer import TokenizerConfig, load_tokenizer
+from loco_drake.generation.tokenizer_score import score_tokenizer
 from loco_drake.generation.train_generator import (
     CORRUPTION,
     encode_clips,
@@ -22,7 +25,7 @@ from loco_drake.generation.train_generator import (
     stitched_clips,
     train_generator,
 )
-from loco_drake.generation.train_tokenizer import score_tokenizer, train_tokenizer
+from loco_drake.generation.train_tokenizer import Scales, train_tokenizer
 from loco_drake.generation.training import LoopSettings
 
 TINY = TokenizerConfig(width=24, depth=1, frame_width=8, books=2, book_size=16)
@@ -173,3 +176,35 @@ def test_windows_are_shifted_by_one_token(library, tokenizer):
         assert set(row.tolist()) == {sequence.label}
     # No window is told a duration that is shorter than itself.
     assert duration.min() >= duration_bin(20 * 4 / 50)
+
+
+def test_errors_are_measured_by_what_varies_within_a_label():
+    """Waves of amplitude a: a / sqrt(2), the steps of which depend on the frequency.
+
+    Two clips of a label on levels of their own also vary by these.
+    """
+    time = np.arange(400) / 50
+    omega = 2 * np.pi * 2.0  # 2 Hz
+    clips = []
+    for label, level, amplitude in (
+        ("dog-trot", 1.0, 0.2),
+        ("dog-trot", 2.0, 0.2),
+        ("dog-pace", 9.0, 0.1),
+    ):
+        features = np.zeros((400, SIZE))
+        features[:, 0] = level + amplitude * np.sin(omega * time)
+        clips.append(Clip("go2", parse_label(label), label, features))
+    names = ("dog-trot", "dog-pace", "horse-walk")
+    labels = torch.tensor([parse_label(name).index for name in names])
+    deviation, change, jitter = Scales(clips)(labels)
+    assert deviation.shape == (3, 1, 18)
+    step = 2 * np.sin(omega / 100)  # of a unit wave, from one frame to the next
+    both = (0.2**2 + 0.1**2) / 4
+    for scale, factor, spread in (
+        (deviation, 1.0, 0.5**2),
+        (change, step, 0.0),
+        (jitter, step**2, 0.0),
+    ):
+        variances = np.array([0.2**2 / 2 + spread, 0.1**2 / 2, both + spread / 2])
+        own = scale[:, 0, 0].numpy() / factor
+        np.testing.assert_allclose(own, np.sqrt(variances), rtol=0.01)

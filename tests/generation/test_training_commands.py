@@ -11,7 +11,7 @@ from loco_drake.motion import load_motion
 
 def test_from_motions_to_new_motions_by_three_commands(motions, tmp_path):
     train = TrainTokenizer(
-        motions=motions,
+        motions=(motions,),
         out=tmp_path / "tokenizer",
         steps=3,
         json=tmp_path / "tokenizer.json",
@@ -24,7 +24,7 @@ def test_from_motions_to_new_motions_by_three_commands(motions, tmp_path):
     assert 0 < figures["codebook_use"] <= 1
     tokenizer = tmp_path / "tokenizer" / "tokenizer.safetensors"
     learn = TrainGenerator(
-        motions=motions,
+        motions=(motions,),
         tokenizer=tokenizer,
         out=tmp_path / "generator",
         books=2,
@@ -47,7 +47,7 @@ def test_from_motions_to_new_motions_by_three_commands(motions, tmp_path):
     assert generate.run() == 0
     assert len(load_motion(tmp_path / "new" / "dog-trot-0.npz")) == 51
     # A tokenizer that was trained anew does not fit the generator of the old one.
-    TrainTokenizer(motions=motions, out=tmp_path / "other", steps=1).run()
+    TrainTokenizer(motions=(motions,), out=tmp_path / "other", steps=1).run()
     generate.tokenizer = tmp_path / "other" / "tokenizer.safetensors"
     with pytest.raises(InputError, match="train the generator again"):
         generate.run()
@@ -63,11 +63,11 @@ def test_from_motions_to_new_motions_by_three_commands(motions, tmp_path):
 )
 def test_bad_options_are_refused(options, message, motions, tmp_path):
     with pytest.raises(InputError, match=message):
-        TrainTokenizer(motions=motions, out=tmp_path, **options).run()
+        TrainTokenizer(motions=(motions,), out=tmp_path, **options).run()
 
 
 def test_a_folder_without_motions_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no Motion files"):
-        TrainTokenizer(motions=tmp_path / "none", out=tmp_path).run()
-    with pytest.raises(InputError, match="no Motion files"):
-        TrainGenerator(motions=tmp_path / "none", out=tmp_path).run()
+    with pytest.raises(InputError, match="no folder of Motion files"):
+        TrainTokenizer(motions=(tmp_path / "none",), out=tmp_path).run()
+    with pytest.raises(InputError, match="no folder of Motion files"):
+        TrainGenerator(motions=(tmp_path / "none",), out=tmp_path).run()

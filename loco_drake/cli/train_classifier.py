@@ -1,0 +1,105 @@
+"""The command ``train classifier``."""
+
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from loco_drake.cli.evaluation import estimate_text
+from loco_drake.cli.output import print_table, write_json
+from loco_drake.cli.training import check_steps, print_stopped
+from loco_drake.errors import InputError
+from loco_drake.evaluation.classifier import ClassifierConfig, predict
+from loco_drake.evaluation.intervals import accuracy
+from loco_drake.evaluation.recorded import load_recorded
+from loco_drake.evaluation.samples import SECONDS, label_weights, make_samples
+from loco_drake.evaluation.train_classifier import (
+    LEARNING_RATE,
+    STEPS,
+    class_indices,
+    train_classifier,
+)
+from loco_drake.gaits import LABELS
+from loco_drake.generation.training import LoopSettings
+from loco_drake.retargeting.trajectories import trajectories
+
+
+@dataclass(kw_only=True)
+class TrainClassifier:
+    """Trains the transformer that tells which gait a trajectory of 2 s is of.
+
+    `evaluate generation` trains its own; this one is to be looked at and used. Ctrl-C
+    saves a checkpoint and stops; --resume goes on from it.
+    """
+
+    motions: Path = Path("motions/go2")
+    """Folder of Motion files, such as `retarget` writes; those for validation are held
+    out to test on."""
+    out: Path = Path("runs/classifier")
+    """Folder for the weights (classifier.safetensors), checkpoint and logs."""
+    steps: int = STEPS
+    """Optimizer steps."""
+    learning_rate: float = LEARNING_RATE
+    """Highest learning rate."""
+    seed: int = 0
+    """Of the weights and the batches."""
+    resume: bool = False
+    """Go on from the checkpoint in --out."""
+    json: Path | None = None
+    """Writes the figures to this file."""
+
+    def run(self) -> int:
+        """Trains; returns 1 if it was stopped before its last step, else 0.
+
+        Raises:
+            InputError: if an option is wrong.
+        """
+        check_steps(self.steps, self.learning_rate)
+        robot, recorded = load_recorded(self.motions)
+        train, validation = (
+            [part for motion in side for part in trajectories(motion)]
+            for side in (recorded.train, recorded.validation)
+        )
+        present = {motion.label for motion in train}
+        labels = tuple(str(label) for label in LABELS if label in present)
+        if len(labels) < 2:
+            raise InputError(
+                f"To tell gaits apart takes motions of {SECONDS:g} s and longer of two "
+                f"labels for training; there are {', '.join(labels) or 'none'}."
+            )
+        validation = [motion for motion in validation if motion.label in present]
+        samples = make_samples(robot, train)
+        settings = LoopSettings(
+            out=self.out,
+            steps=self.steps,
+            learning_rate=self.learning_rate,
+            seed=self.seed,
+            resume=self.resume,
+        )
+        start = time.perf_counter()
+        classifier, result = train_classifier(
+            samples, ClassifierConfig(labels=labels), settings
+        )
+        if result.stopped:
+            return print_stopped(result.steps, self.steps)
+        figures: dict[str, Any] = {
+            "steps": result.steps,
+            "wall_clock_s": time.perf_counter() - start,
+        }
+        rows = []
+        for name, motions in (("train", train), ("validation", validation)):
+            estimate = None
+            if motions:
+                samples = make_samples(robot, motions)
+                right = class_indices(samples.labels, labels)
+                correct = predict(classifier, samples.channels) == right[:, None]
+                weights = label_weights(samples.labels)
+                estimate = asdict(
+                    accuracy(correct.mean(axis=1)[None], weights, samples.subjects)
+                )
+            figures[f"{name}_accuracy"] = estimate
+            rows.append([name, str(len(motions)), estimate_text(estimate)])
+        write_json(self.json, figures)
+        title = f"{self.out / 'classifier.safetensors'}: {', '.join(labels)}"
+        print_table(title, ["recordings", "trajectories", "accuracy"], rows)
+        return 0

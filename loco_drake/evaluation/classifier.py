@@ -1,0 +1,142 @@
+"""The classifier that tells which gait a trajectory is of: a small transformer.
+
+After PoseGPT's (Lucas et al. 2022), on which the paper's Table 1 is built: attention
+over short stretches of the trajectory, averaged over time, then a layer of few
+channels that the Frechet distance is measured on.
+"""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from loco_drake.evaluation.samples import CHANNELS, FRAMES
+from loco_drake.generation.determinism import single_thread
+from loco_drake.weights import load_network, save_weights
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ClassifierConfig:
+    """What is needed to build a :class:`GaitClassifier`.
+
+    Attributes:
+        labels: names of the gait labels that it tells apart.
+        frames_per_patch: frames that are put side by side as one step of time.
+        width: channels.
+        layers: transformer layers.
+        heads: attention heads.
+        embedding: channels of the last layer but one.
+        dropout: probability, while training.
+    """
+
+    labels: tuple[str, ...]
+    frames_per_patch: int = 5
+    width: int = 64
+    layers: int = 2
+    heads: int = 4
+    embedding: int = 32
+    dropout: float = 0.1
+
+
+class GaitClassifier(nn.Module):
+    """Channels of :mod:`loco_drake.evaluation.samples` to logits of labels.
+
+    Args:
+        config: its sizes.
+    """
+
+    def __init__(self, config: ClassifierConfig) -> None:
+        super().__init__()
+        self.config = config
+        self.register_buffer("mean", torch.zeros(CHANNELS))
+        self.register_buffer("std", torch.ones(CHANNELS))
+        self.mean: Tensor
+        self.std: Tensor
+        patches = FRAMES // config.frames_per_patch
+        self.patch_in = nn.Linear(config.frames_per_patch * CHANNELS, config.width)
+        self.time = nn.Parameter(torch.randn(patches, config.width) * 0.02)
+        layer = nn.TransformerEncoderLayer(
+            config.width,
+            config.heads,
+            2 * config.width,
+            config.dropout,
+            activation="gelu",
+            batch_first=True,
+            norm_first=True,
+        )
+        self.encoder = nn.TransformerEncoder(
+            layer, config.layers, enable_nested_tensor=False
+        )
+        self.embed_out = nn.Sequential(
+            nn.LayerNorm(config.width),
+            nn.Linear(config.width, config.embedding),
+            nn.Tanh(),
+        )
+        self.head = nn.Linear(config.embedding, len(config.labels))
+
+    def set_statistics(self, channels: Tensor) -> None:
+        """Takes mean and spread of channels (N, CHANNELS) for normalization."""
+        self.mean.copy_(channels.mean(dim=0))
+        self.std.copy_(channels.std(dim=0).clamp(min=1e-3))
+
+    def embed(self, channels: Tensor) -> Tensor:
+        """Maps (B, FRAMES, CHANNELS) to embeddings (B, embedding), within (-1, 1)."""
+        x = (channels - self.mean) / self.std
+        x = x.reshape(len(x), len(self.time), -1)
+        x = self.encoder(self.patch_in(x) + self.time)
+        out: Tensor = self.embed_out(x.mean(dim=1))
+        return out
+
+    def forward(self, channels: Tensor) -> Tensor:
+        """Maps (B, FRAMES, CHANNELS) to logits (B, labels)."""
+        logits: Tensor = self.head(self.embed(channels))
+        return logits
+
+
+def embeddings(classifier: GaitClassifier, channels: Array) -> Array:
+    """Returns embeddings (..., embedding) of channels (..., FRAMES, CHANNELS)."""
+    flat = channels.reshape(-1, FRAMES, CHANNELS)
+    with torch.inference_mode(), single_thread():
+        parts = [
+            classifier.embed(torch.tensor(batch, dtype=torch.float32))
+            for batch in np.split(flat, range(256, len(flat), 256))
+        ]
+    out = torch.cat(parts).numpy().astype(np.float64)
+    return out.reshape(*channels.shape[:-2], -1)
+
+
+def predict(classifier: GaitClassifier, channels: Array) -> NDArray[np.int64]:
+    """Returns the likeliest label's index in config.labels, shape (...)."""
+    embedded = torch.tensor(embeddings(classifier, channels), dtype=torch.float32)
+    with torch.inference_mode(), single_thread():
+        logits = classifier.head(embedded)
+    return logits.argmax(dim=-1).numpy()
+
+
+def save_classifier(
+    classifier: GaitClassifier, path: Path, info: dict[str, Any]
+) -> None:
+    """Writes the weights; ``info`` is added to the header for people."""
+    config = {"network": asdict(classifier.config), "info": info}
+    save_weights(path, "classifier", classifier.state_dict(), config)
+
+
+def load_classifier(path: Path) -> GaitClassifier:
+    """Reads a classifier, ready for inference.
+
+    Raises:
+        InputError: if the file is missing, damaged, or of something else.
+    """
+
+    def build(network: dict[str, Any]) -> GaitClassifier:
+        return GaitClassifier(
+            ClassifierConfig(**{**network, "labels": tuple(network["labels"])})
+        )
+
+    return load_network(path, "classifier", build)

@@ -1,0 +1,119 @@
+"""Does motion of a minute end as it began?
+
+The last 10 s of each motion are compared with its first 10 s in four figures:
+
+speed            of the base along its heading, m/s
+height           mean of the base's, m
+stride period    see :mod:`loco_drake.gait_timing`, s
+slip             median speed of the toes in stance, m/s
+
+A figure's change is the median over motions of ``|last - first|``. How much two samples
+of the gait differ is told by the first 10 s of motions of different seeds: 95 % of the
+pairs differ by no more than the tolerance, which is at least the RESOLUTION of the
+figure. Drift is change over tolerance, and the drift of a generator is that of its
+worst figure of its worst gait: 1 or less means that the last 10 s differ from the first
+no more than two samples from each other. (By chance alone a figure of a generator that
+does not drift gets about .35.) A rhythm that is lost on the way counts as a change of
+the period by itself.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.evaluation.motion_scores import mean_speed
+from loco_drake.gait_timing import motion_track, stride_period
+from loco_drake.models.robots import Robot
+from loco_drake.motion import Motion
+from loco_drake.motion_quality import stance_slip_median, toe_trajectories
+
+Array = NDArray[np.float64]
+
+SECONDS = 60.0
+WINDOW = 10.0
+# What a difference must exceed to matter at all.
+RESOLUTION = {
+    "speed_mps": 0.01,
+    "height_m": 0.001,
+    "stride_period_s": 0.005,
+    "stance_slip_median_mps": 0.005,
+}
+
+
+def drift(robot: Robot, motions: Sequence[Motion]) -> dict[str, Any]:
+    """Returns the drift of each figure, of motions of one gait; see above.
+
+    Args:
+        robot: that of the motions.
+        motions: two or more of different seeds, longer than 2 WINDOW.
+
+    Returns:
+        For each figure its means in the first and last WINDOW seconds, the share of
+        motions that lost it, change, tolerance, and drift. A figure that fewer than
+        two motions have in their first window, such as a stride period of robots that
+        stand, is left out.
+    """
+    windows = [round(WINDOW * motion.fps) for motion in motions]
+    first = _table(
+        robot, [m.slice(0, n) for m, n in zip(motions, windows, strict=True)]
+    )
+    last = _table(
+        robot,
+        [m.slice(len(m) - n, len(m)) for m, n in zip(motions, windows, strict=True)],
+    )
+    result = {}
+    for column, (name, resolution) in enumerate(RESOLUTION.items()):
+        known = ~np.isnan(first[:, column])
+        begin, end = first[known, column], last[known, column]
+        if len(begin) < 2:
+            continue
+        lost = np.isnan(end)
+        apart = np.abs(begin[:, None] - begin)[np.triu_indices(len(begin), k=1)]
+        tolerance = max(resolution, float(np.quantile(apart, 0.95)))
+        change = float(np.median(np.abs(np.where(lost, 0.0, end) - begin)))
+        result[name] = {
+            "first": float(begin.mean()),
+            "last": None if lost.all() else float(end[~lost].mean()),
+            "lost": float(lost.mean()),
+            "change": change,
+            "tolerance": tolerance,
+            "drift": change / tolerance,
+        }
+    return result
+
+
+def worst(drifts: dict[str, dict[str, Any]]) -> dict[str, Any] | None:
+    """Returns label, figure and drift of the worst; None if nothing was measured.
+
+    Args:
+        drifts: by label, from :func:`drift`.
+    """
+    found = [
+        (figures["drift"], label, name)
+        for label, by_name in drifts.items()
+        for name, figures in by_name.items()
+    ]
+    if not found:
+        return None
+    value, label, name = max(found)
+    return {"drift": value, "label": label, "figure": name}
+
+
+def _table(robot: Robot, windows: Sequence[Motion]) -> Array:
+    """Returns the figures of each window, NaN for those that it does not have."""
+    rows = []
+    for motion in windows:
+        slip = stance_slip_median(
+            toe_trajectories(motion, robot), robot.foot_radius, motion.fps
+        )
+        rows.append(
+            [
+                mean_speed(robot, motion),
+                float(motion.base_position[:, 2].mean()),
+                stride_period(motion_track(motion, robot)),
+                slip,
+            ]
+        )
+    return np.array(rows, dtype=np.float64)

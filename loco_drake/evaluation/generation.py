@@ -1,0 +1,287 @@
+"""How good generated motion is: all figures of ``loco-drake evaluate generation``."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from loco_drake.errors import InputError
+from loco_drake.evaluation import drift as drifting
+from loco_drake.evaluation.classifier import embeddings
+from loco_drake.evaluation.frechet import frechet_distance, moments
+from loco_drake.evaluation.motion_scores import compare, measure, overall
+from loco_drake.evaluation.nearest import nearest_distances
+from loco_drake.evaluation.recognition import (
+    LinearRecognizer,
+    Recognition,
+    TransformerRecognizer,
+    recognize,
+)
+from loco_drake.evaluation.recorded import Recorded
+from loco_drake.evaluation.samples import (
+    SUMMARY,
+    Samples,
+    join,
+    label_weights,
+    make_samples,
+)
+from loco_drake.evaluation.two_sample import FOLDS, two_sample_accuracy
+from loco_drake.gaits import LABELS
+from loco_drake.models.robots import Robot
+from loco_drake.motion import Motion
+from loco_drake.retargeting.trajectories import trajectories
+
+Array = NDArray[np.float64]
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Generated:
+    """Motion to be scored.
+
+    Attributes:
+        sets: trajectories of 2 s, drawn several times over.
+        long: motions of a minute by label, for the drift; may lack labels.
+    """
+
+    sets: tuple[tuple[Motion, ...], ...]
+    long: dict[str, list[Motion]]
+
+
+@dataclass(frozen=True, eq=False)
+class GenerationScore:
+    """The figures, and what pictures of them are made of.
+
+    Attributes:
+        figures: as JSON.
+        recognition: by kind of classifier.
+    """
+
+    figures: dict[str, Any]
+    recognition: dict[str, Recognition]
+
+
+def score_generation(
+    robot: Robot,
+    recorded: Recorded,
+    generated: Generated,
+    *,
+    seeds: Sequence[int],
+    steps: int,
+    say: Say = lambda text: None,
+) -> GenerationScore:
+    """Compares generated with recorded motion of one robot.
+
+    Only labels that recordings of both sides and generated motion have are compared.
+
+    Args:
+        robot: that of all motions.
+        recorded: whole stretches.
+        generated: what is scored.
+        seeds: of the classifiers; all else that is random follows the first.
+        steps: of the transformer's training.
+        say: is told what goes on.
+
+    Raises:
+        InputError: if there are fewer than two such labels.
+    """
+    names = set(recorded.labels) & {str(m.label) for m in generated.sets[0]}
+    if len(names) < 2:
+        raise InputError(
+            "To tell gaits apart takes two labels at least, with recordings for "
+            f"training and for validation; there are {', '.join(names) or 'none'}."
+        )
+    train, validation = (
+        [m for m in side if str(m.label) in names]
+        for side in (recorded.train, recorded.validation)
+    )
+    sets = [[m for m in each if str(m.label) in names] for each in generated.sets]
+    cut_train, cut_validation = (
+        [part for motion in side for part in trajectories(motion)]
+        for side in (train, validation)
+    )
+    with threadpool_limits(1):  # the same figures on any machine
+        of_train = make_samples(robot, cut_train)
+        of_validation = make_samples(robot, cut_validation)
+        of_sets = _samples_of_sets(robot, sets)
+        recognition = {}
+        for kind, fit in (
+            ("transformer", lambda s, seed: TransformerRecognizer(s, seed, steps)),
+            ("linear", LinearRecognizer),
+        ):
+            recognition[kind] = recognize(
+                fit, of_train, of_validation, of_sets, seeds, _prefix(kind, say)
+            )
+        say("Comparing real with generated motion")
+        figures: dict[str, Any] = {
+            "trajectories": {
+                "train": len(of_train),
+                "validation": len(of_validation),
+                "generated": sum(map(len, of_sets)),
+            },
+            "classifiers": {kind: _rows(found) for kind, found in recognition.items()},
+            "confusion": _confusion(recognition),
+            **_two_sample(of_train, of_validation, join(of_sets), list(seeds)),
+            **_frechet(recognition["transformer"], of_train, of_validation, of_sets),
+            **_nearest(train, cut_train, cut_validation, sets),
+            **_drift(robot, generated.long),
+            **_by_label(robot, recorded, generated),
+            "reason": {},
+        }
+    few = f"Fewer than {FOLDS} subjects on a side."
+    for name in ("two_sample_accuracy", "two_sample_accuracy_real_real"):
+        if figures[name] is None:
+            figures["reason"][name] = few
+    return GenerationScore(figures, recognition)
+
+
+def _samples_of_sets(robot: Robot, sets: Sequence[Sequence[Motion]]) -> list[Samples]:
+    """Returns samples of each set; motions without a subject are one each."""
+    joined = make_samples(robot, [motion for each in sets for motion in each])
+    ends = np.cumsum([len(each) for each in sets])
+    return [
+        joined[np.arange(end - len(each), end)]
+        for each, end in zip(sets, ends, strict=True)
+    ]
+
+
+def _prefix(kind: str, say: Say) -> Say:
+    return lambda text: say(f"{kind} classifier, {text}")
+
+
+def _rows(recognition: Recognition) -> dict[str, Any]:
+    rows: dict[str, Any] = {
+        row: {name: asdict(estimate) for name, estimate in by_name.items()}
+        for row, by_name in recognition.accuracies.items()
+    }
+    real = rows["real_to_real"]["all"]["mean"]
+    diversity = rows["generated_to_real"]["all"]["mean"]
+    return {**rows, "diversity_over_real": diversity / real if real else None}
+
+
+def _confusion(recognition: dict[str, Recognition]) -> dict[str, Any]:
+    some = next(iter(recognition.values()))
+    matrices = {
+        kind: {row: matrix.round(4).tolist() for row, matrix in r.confusion.items()}
+        for kind, r in recognition.items()
+    }
+    return {"labels": [str(LABELS[label]) for label in some.labels], **matrices}
+
+
+def _two_sample(
+    train: Samples, validation: Samples, generated: Samples, seeds: list[int]
+) -> dict[str, Any]:
+    """Returns the two-sample tests: of all recordings, and of parts of the summary."""
+    real = join((train, validation))
+
+    def test(a: Samples, b: Samples, fit: str = "linear") -> dict[str, float] | None:
+        estimate = two_sample_accuracy(a, b, seeds, fit)
+        return None if estimate is None else asdict(estimate)
+
+    def part(samples: Samples, columns: slice) -> Samples:
+        return replace(samples, summaries=samples.summaries[..., columns])
+
+    return {
+        "two_sample_accuracy": test(real, generated),
+        "two_sample_accuracy_kernel": test(real, generated, "kernel"),
+        "two_sample_accuracy_of_parts": {
+            name: test(part(real, columns), part(generated, columns))
+            for name, columns in SUMMARY.items()
+        },
+        "two_sample_accuracy_real_real": test(train, validation),
+    }
+
+
+def _frechet(
+    recognition: Recognition,
+    train: Samples,
+    validation: Samples,
+    sets: Sequence[Samples],
+) -> dict[str, Any]:
+    """Returns Frechet distances, means over classifiers and sets, and their spread."""
+    distances, floors = [], []
+    for recognizer in recognition.of_recordings:
+        assert isinstance(recognizer, TransformerRecognizer)
+        classifier = recognizer.classifier
+        of_train, of_validation, *of_sets = (
+            moments(embeddings(classifier, s.channels), label_weights(s.labels))
+            for s in (train, validation, *sets)
+        )
+        floors.append(frechet_distance(of_train, of_validation))
+        distances.append([frechet_distance(of_train, each) for each in of_sets])
+    return {
+        "fid": float(np.mean(distances)),
+        "fid_real_real": float(np.mean(floors)),
+        "fid_over_real_real": float(np.mean(distances) / np.mean(floors)),
+        "fid_range": [float(np.min(distances)), float(np.max(distances))],
+        "fid_real_real_range": [float(np.min(floors)), float(np.max(floors))],
+    }
+
+
+def _nearest(
+    train: Sequence[Motion],
+    cut_train: Sequence[Motion],
+    cut_validation: Sequence[Motion],
+    sets: Sequence[Sequence[Motion]],
+) -> dict[str, Any]:
+    """Returns mean distances to the nearest stretch of training; labels weigh alike."""
+
+    def mean(
+        motions: Sequence[Motion], *, other_subjects: bool = False
+    ) -> float | None:
+        distances = nearest_distances(motions, train, other_subjects=other_subjects)
+        known = np.isfinite(distances)
+        if not known.any():
+            return None
+        labels = np.array([m.label.index for m in motions])[known]
+        return float(distances[known] @ label_weights(labels))
+
+    return {
+        "nearest_training_rad": mean([motion for each in sets for motion in each]),
+        "nearest_training_rad_validation": mean(cut_validation),
+        "nearest_training_rad_leave_one_out": mean(cut_train, other_subjects=True),
+    }
+
+
+def _drift(robot: Robot, long: dict[str, list[Motion]]) -> dict[str, Any]:
+    drifts = {
+        label: drifting.drift(robot, motions)
+        for label, motions in long.items()
+        if len(motions) > 1
+    }
+    worst = drifting.worst(drifts)
+    return {
+        "drift_60s": None if worst is None else worst["drift"],
+        "drift": {"worst": worst, "labels": drifts},
+    }
+
+
+def _by_label(robot: Robot, recorded: Recorded, generated: Generated) -> dict[str, Any]:
+    """Returns the figures of each label, of all and of labels beyond the fifteen."""
+    known = {str(label) for label in LABELS}
+    by_label: dict[str, list[Motion]] = {}
+    for motion in (m for each in generated.sets for m in each):
+        by_label.setdefault(str(motion.label), []).append(motion)
+    measured = {name: measure(robot, motions) for name, motions in by_label.items()}
+    figures = {}
+    for name, of_generated in measured.items():
+        stretches = [
+            motion
+            for motion in (*recorded.train, *recorded.validation)
+            if str(motion.label) == name
+        ]
+        cuts = [part for motion in stretches for part in trajectories(motion)]
+        of_recordings = measure(robot, cuts or stretches) if stretches else None
+        figures[name] = compare(of_generated, of_recordings)
+    ordered = [str(label) for label in LABELS if str(label) in figures]
+    return {
+        "labels": {name: figures[name] for name in ordered},
+        "all": overall(
+            {name: figures[name] for name in ordered},
+            [measured[name] for name in ordered],
+        ),
+        "other": {k: v for k, v in figures.items() if k not in known},
+    }

@@ -1,0 +1,140 @@
+"""Pictures of what tokenizer and generator do."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from loco_drake.evaluation.recognition import Recognition
+from loco_drake.gaits import LABELS
+from loco_drake.models.kinematics import toe_positions
+from loco_drake.models.robots import Robot
+from loco_drake.motion import Motion
+from loco_drake.rotations import (
+    quat_conjugate,
+    quat_multiply,
+    quat_rotate,
+    yaw_of,
+    yaw_quat,
+)
+
+Array = NDArray[np.float64]
+
+POSES = 8  # stick figures in a strip
+STRIP_SECONDS = 0.7
+SPACING = 0.75  # m, between them
+
+_TITLES = {
+    "real_to_real": "recordings, by recordings",
+    "real_to_generated": "generated, by recordings",
+    "generated_to_real": "recordings, by generated",
+}
+
+
+def confusion_figure(recognition: Recognition, title: str) -> Figure:
+    """Returns three confusion matrices: what each gait (row) was taken for."""
+    names = [str(LABELS[label]) for label in recognition.labels]
+    figure = Figure(figsize=(15, 6.6), layout="constrained")
+    figure.suptitle(title)
+    columns = figure.subplots(1, len(_TITLES))
+    for column, (row, what) in enumerate(_TITLES.items()):
+        axes = columns[column]
+        matrix = recognition.confusion[row]
+        axes.imshow(matrix, vmin=0, vmax=1, cmap="Blues")
+        for (i, j), share in np.ndenumerate(matrix):
+            if share >= 0.005:
+                color = "w" if share > 0.5 else "k"
+                text = f"{100 * share:.0f}"
+                axes.text(j, i, text, ha="center", va="center", color=color, size=6)
+        accuracy = recognition.accuracies[row]["all"].mean
+        axes.set_title(f"{what}: {accuracy:.3f}")
+        axes.set_xticks(range(len(names)), names, rotation=90, size=7)
+        axes.set_yticks(range(len(names)), names if column == 0 else [], size=7)
+        axes.set_xlabel("taken for [%]")
+    return figure
+
+
+def code_use_figure(counts: NDArray[np.int64], title: str) -> Figure:
+    """Returns how often the codes of each book are used, the most used first.
+
+    Args:
+        counts: shape (books, book_size).
+        title: of the picture.
+    """
+    figure = Figure(figsize=(8, 4.5), layout="constrained")
+    axes = figure.add_subplot()
+    for book, used in enumerate(counts):
+        share = np.sort(used)[::-1] / max(used.sum(), 1)
+        color = str(0.75 * book / len(counts))
+        label = f"book {book + 1}: {np.count_nonzero(used)} of {len(used)}"
+        axes.plot(np.arange(1, len(used) + 1), share, color=color, label=label)
+    axes.set(xlabel="code, by use", ylabel="share of the book's use", title=title)
+    axes.set_yscale("log")
+    axes.legend()
+    return figure
+
+
+def motion_figure(
+    robot: Robot, recorded: Sequence[Motion], generated: Sequence[Motion]
+) -> Figure:
+    """Returns strips of stick figures, recorded above generated, for each label.
+
+    A strip shows the robot from its left side every tenth of a second, with its left
+    legs in front; the first motion of each label is shown.
+    """
+    first_recorded = {str(m.label): m for m in reversed(recorded)}
+    first_generated = {str(m.label): m for m in reversed(generated)}
+    names = [
+        str(label)
+        for label in LABELS
+        if str(label) in first_recorded and str(label) in first_generated
+    ]
+    figure = Figure(figsize=(14, 1.3 * len(names)), layout="constrained")
+    axes = figure.subplots(len(names), 2, squeeze=False)
+    for row, name in zip(axes, names, strict=True):
+        for cell, what, motion in (
+            (row[0], "recorded", first_recorded[name]),
+            (row[1], "generated", first_generated[name]),
+        ):
+            _strip(cell, robot, motion)
+            cell.set_title(f"{name}, {what}", size=9)
+    return figure
+
+
+def _strip(axes: Axes, robot: Robot, motion: Motion) -> None:
+    """Draws poses side by side, as seen from the left, x forward."""
+    frames = np.linspace(0, STRIP_SECONDS * motion.fps, POSES).round().astype(int)
+    frames = np.minimum(frames, len(motion) - 1)
+    # A leg whose calf has no length ends at its knee.
+    to_knee = replace(robot, calf_length=0.0)
+    hips = np.broadcast_to(robot.p_BHip, (len(motion), 4, 3))
+    legs = [
+        _seen(motion, points)[frames]
+        for points in (
+            hips,
+            toe_positions(to_knee, motion.joint_positions),
+            toe_positions(robot, motion.joint_positions),
+        )
+    ]
+    for place, (hip, knee, toe) in enumerate(zip(*legs, strict=True)):
+        shift = np.array([place * SPACING, 0.0])
+        for leg, color in ((1, "0.7"), (3, "0.7"), (0, "C0"), (2, "C1")):
+            line = np.stack((hip[leg], knee[leg], toe[leg])) + shift
+            axes.plot(*line.T, color=color, lw=1.5)
+        trunk = np.stack((hip[:2].mean(axis=0), hip[2:].mean(axis=0))) + shift
+        axes.plot(*trunk.T, color="k", lw=2)
+    axes.axhline(0.0, color="0.5", lw=0.8)
+    axes.set_aspect("equal")
+    axes.axis("off")
+
+
+def _seen(motion: Motion, points: Array) -> Array:
+    """Returns points of the base's frame (T, N, 3), from its side: ahead, up."""
+    upright = quat_conjugate(yaw_quat(yaw_of(motion.base_quaternion)))
+    q_HB = quat_multiply(upright, motion.base_quaternion)
+    level: Array = quat_rotate(q_HB[:, None], points)[..., [0, 2]]
+    level[..., 1] += motion.base_position[:, None, 2]
+    return level

@@ -1,0 +1,145 @@
+"""How generated motion of a gait compares, figure by figure, with recorded motion.
+
+======================== ==============================================================
+stance_slip_median_mps   median speed of all toes in stance, pooled over all motions;
+                         see :func:`loco_drake.motion_quality.stance_slip_speeds`
+penetration_max_m        deepest below the ground of any toe of any motion
+jerk_ratio               RMS of the joints' jerk, over that of recorded motion
+speed_error_mps          ``|mean speed - mean speed of recorded motion|``
+speed_distance_mps       how far speeds would have to be moved, on average, to be spread
+                         like those of recorded motion (Wasserstein distance)
+======================== ==============================================================
+
+Jerk is the third difference of joint angles times FPS cubed, RMS over frames, joints
+and motions. Speed is the mean over a trajectory of the base's velocity along its
+heading. Of recorded motion all subjects count, those of validation too. For all
+labels together: the median of the pooled speeds, the deepest, the geometric mean of
+the jerk ratios, the means of the two speed figures over labels.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import gmean, wasserstein_distance
+
+from loco_drake.generation.features import VELOCITY, motion_features
+from loco_drake.models.robots import Robot
+from loco_drake.motion import Motion
+from loco_drake.motion_quality import (
+    penetration_max,
+    stance_slip_speeds,
+    toe_trajectories,
+)
+
+Array = NDArray[np.float64]
+
+# Of a label without generated motion.
+NULL_FIGURES: dict[str, Any] = {
+    "stance_slip_median_mps": None,
+    "penetration_max_m": None,
+    "jerk_ratio": None,
+    "speed_error_mps": None,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What several motions of a label measure.
+
+    Attributes:
+        slip_speeds: of each step of each toe in stance, m/s, shape (N,).
+        penetration: deepest below the ground, m.
+        jerk: RMS of the joints' jerk, rad/s^3; None if all motions are too short.
+        speeds: mean speed of each motion along its heading, m/s, shape (M,).
+    """
+
+    slip_speeds: Array
+    penetration: float
+    jerk: float | None
+    speeds: Array
+
+
+def measure(robot: Robot, motions: Sequence[Motion]) -> Measured:
+    """Returns the figures of one or more motions of one robot."""
+    toes = [toe_trajectories(motion, robot) for motion in motions]
+    radius = robot.foot_radius
+    slips = [
+        stance_slip_speeds(p_WF, radius, motion.fps)
+        for p_WF, motion in zip(toes, motions, strict=True)
+    ]
+    return Measured(
+        slip_speeds=np.concatenate(slips),
+        penetration=max(penetration_max(p_WF, radius) for p_WF in toes),
+        jerk=joint_jerk(motions),
+        speeds=np.array([mean_speed(robot, motion) for motion in motions]),
+    )
+
+
+def joint_jerk(motions: Sequence[Motion]) -> float | None:
+    """Returns the RMS of the joints' jerk in rad/s^3, None without four frames."""
+    jerks = [np.diff(m.joint_positions, n=3, axis=0) * m.fps**3 for m in motions]
+    squares = np.concatenate([jerk.ravel() ** 2 for jerk in jerks])
+    return float(np.sqrt(squares.mean())) if len(squares) else None
+
+
+def mean_speed(robot: Robot, motion: Motion) -> float:
+    """Returns the mean velocity of the base along its heading, m/s."""
+    along = motion_features(robot, motion)[1:, VELOCITY][:, 0]
+    return float(along.mean()) * robot.stand_height
+
+
+def compare(generated: Measured, recorded: Measured | None) -> dict[str, Any]:
+    """Returns the figures of a label; those that need recordings may be None."""
+    slip = generated.slip_speeds
+    figures: dict[str, Any] = {
+        "stance_slip_median_mps": float(np.median(slip)) if len(slip) else None,
+        "penetration_max_m": generated.penetration,
+        "jerk_ratio": None,
+        "speed_error_mps": None,
+        "speed_distance_mps": None,
+        "speed_mps": float(generated.speeds.mean()),
+    }
+    if recorded is None:
+        return {**figures, "reason": "There are no recordings of this label."}
+    if generated.jerk is not None and recorded.jerk:
+        figures["jerk_ratio"] = generated.jerk / recorded.jerk
+    apart = generated.speeds.mean() - recorded.speeds.mean()
+    figures["speed_error_mps"] = abs(float(apart))
+    figures["speed_distance_mps"] = float(
+        wasserstein_distance(generated.speeds, recorded.speeds)
+    )
+    slip = recorded.slip_speeds
+    figures["recorded"] = {
+        "stance_slip_median_mps": float(np.median(slip)) if len(slip) else None,
+        "penetration_max_m": recorded.penetration,
+        "speed_mps": float(recorded.speeds.mean()),
+    }
+    return figures
+
+
+def overall(
+    labels: Mapping[str, dict[str, Any]], measured: Sequence[Measured]
+) -> dict[str, Any]:
+    """Returns the figures of all labels together.
+
+    Args:
+        labels: figures of each, from :func:`compare`.
+        measured: of the generated motion, label by label.
+    """
+    slips = np.concatenate([np.empty(0), *(m.slip_speeds for m in measured)])
+
+    def values(key: str) -> list[float]:
+        return [f[key] for f in labels.values() if f.get(key) is not None]
+
+    jerk = values("jerk_ratio")
+    error, distance = values("speed_error_mps"), values("speed_distance_mps")
+    return {
+        "stance_slip_median_mps": float(np.median(slips)) if len(slips) else None,
+        "penetration_max_m": max((m.penetration for m in measured), default=None),
+        "jerk_ratio": float(gmean(jerk)) if jerk else None,
+        "speed_error_mps": float(np.mean(error)) if error else None,
+        "speed_distance_mps": float(np.mean(distance)) if distance else None,
+    }

@@ -1,0 +1,211 @@
+"""Table 1 of the paper: can gaits be told apart, in real and in generated motion?
+
+A classifier of all labels is trained on one set of trajectories and tested on another
+(GAN-train and GAN-test of Shmelkov, Schmid, Alahari 2018):
+
+=================== ==================================================================
+real_to_real        trained on recordings, tested on recordings of other subjects
+real_to_generated   trained on recordings, tested on generated motion: quality
+generated_to_real   trained on generated motion, tested on the recordings of validation:
+                    diversity
+generated_to_real_matched
+                    the same, with no more generated trajectories of a label than the
+                    recordings to train on have
+=================== ==================================================================
+
+Accuracies are means over labels, each of which weighs the same; mirror images count
+half. Rows of a source are of the same classifier, over the labels of that source.
+"""
+
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.evaluation.classifier import ClassifierConfig, GaitClassifier, predict
+from loco_drake.evaluation.intervals import Estimate, accuracy
+from loco_drake.evaluation.samples import (
+    Samples,
+    choose_per_label,
+    count_per_label,
+    join,
+    label_weights,
+)
+from loco_drake.evaluation.train_classifier import (
+    LEARNING_RATE,
+    STEPS,
+    fit_linear,
+    train_classifier,
+)
+from loco_drake.gaits import LABELS, SOURCES
+from loco_drake.generation.training import LoopSettings
+
+Array = NDArray[np.float64]
+Labels = NDArray[np.int64]
+
+
+class Recognizer(Protocol):
+    """A trained classifier."""
+
+    def __call__(self, samples: Samples) -> Labels:
+        """Returns the label, as index into LABELS, of each side, shape (N, 2)."""
+        ...
+
+
+# Trains a classifier on samples, with a seed.
+Fit = Callable[[Samples, int], Recognizer]
+
+
+class LinearRecognizer:
+    """Multinomial logistic regression on the summaries.
+
+    Args:
+        samples: to learn from; nothing is random.
+        seed: not used.
+    """
+
+    def __init__(self, samples: Samples, seed: int = 0) -> None:
+        features = samples.summaries.reshape(2 * len(samples), -1)
+        self._fitted = fit_linear(features, np.repeat(samples.labels, 2))
+
+    def __call__(self, samples: Samples) -> Labels:
+        """Returns the label of each side, shape (N, 2)."""
+        features = samples.summaries.reshape(2 * len(samples), -1)
+        found: Labels = self._fitted.predict(features).reshape(-1, 2)
+        return found
+
+
+class TransformerRecognizer:
+    """The transformer of :mod:`loco_drake.evaluation.classifier`.
+
+    Args:
+        samples: to learn from.
+        seed: of its weights and batches.
+        steps: of the optimizer.
+    """
+
+    def __init__(self, samples: Samples, seed: int = 0, steps: int = STEPS) -> None:
+        present = np.unique(samples.labels)
+        names = tuple(str(LABELS[label]) for label in present)
+        self._labels = present
+        with tempfile.TemporaryDirectory() as folder:
+            settings = LoopSettings(
+                out=Path(folder), steps=steps, learning_rate=LEARNING_RATE, seed=seed
+            )
+            self.classifier: GaitClassifier
+            self.classifier, result = train_classifier(
+                samples, ClassifierConfig(labels=names), settings
+            )
+        if result.stopped:
+            raise KeyboardInterrupt
+
+    def __call__(self, samples: Samples) -> Labels:
+        """Returns the label of each side, shape (N, 2)."""
+        found: Labels = self._labels[predict(self.classifier, samples.channels)]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Recognition:
+    """How well one kind of classifier did.
+
+    Attributes:
+        accuracies: by row of the table above, then by "all" or source.
+        confusion: by row, how often (share) each label was taken for which: shape
+            (labels, labels), rows are the truth.
+        labels: those of the rows and columns, index into LABELS.
+        of_recordings: the classifiers that were trained on recordings, one a seed.
+    """
+
+    accuracies: dict[str, dict[str, Estimate]]
+    confusion: dict[str, Array]
+    labels: Labels
+    of_recordings: tuple[Recognizer, ...]
+
+
+def recognize(
+    fit: Fit,
+    train: Samples,
+    validation: Samples,
+    generated: Sequence[Samples],
+    seeds: Sequence[int],
+    say: Callable[[str], None] = lambda text: None,
+) -> Recognition:
+    """Trains classifiers on recordings and on generated motion, and tests them.
+
+    Args:
+        fit: kind of classifier.
+        train: recordings to train on.
+        validation: recordings of other subjects, of the same labels.
+        generated: one set or several; with one seed after the other, a classifier
+            learns from one set after the other.
+        seeds: of the classifiers, one run each.
+        say: is told what goes on.
+    """
+    everything = join(generated)
+    counts = count_per_label(train)
+    found: dict[str, list[Labels]] = {
+        "real_to_real": [],
+        "real_to_generated": [],
+        "generated_to_real": [],
+        "generated_to_real_matched": [],
+    }
+    of_recordings = []
+    for run, seed in enumerate(seeds):
+        say(f"run {run + 1} of {len(seeds)}: learning from recordings")
+        recognizer = fit(train, seed)
+        of_recordings.append(recognizer)
+        found["real_to_real"].append(recognizer(validation))
+        found["real_to_generated"].append(recognizer(everything))
+        say(f"run {run + 1} of {len(seeds)}: learning from generated motion")
+        own = generated[run % len(generated)]
+        found["generated_to_real"].append(fit(own, seed)(validation))
+        few = choose_per_label(own, counts, np.random.default_rng(seed))
+        if len(few) < len(own):
+            say(f"run {run + 1} of {len(seeds)}: ... of as many trajectories")
+            found["generated_to_real_matched"].append(fit(few, seed)(validation))
+        else:
+            found["generated_to_real_matched"].append(found["generated_to_real"][-1])
+    labels = np.unique(validation.labels)
+    accuracies, confusion = {}, {}
+    for row, answers in found.items():
+        tested = everything if row == "real_to_generated" else validation
+        accuracies[row] = _accuracies(np.stack(answers), tested)
+        confusion[row] = confusion_matrix(np.stack(answers), tested.labels, labels)
+    return Recognition(accuracies, confusion, labels, tuple(of_recordings))
+
+
+def _accuracies(answers: Labels, tested: Samples) -> dict[str, Estimate]:
+    """Returns accuracies of answers (runs, N, 2), of all labels and of each source."""
+    correct = (answers == tested.labels[:, None]).mean(axis=2)
+    sources = np.array([LABELS[label].source for label in tested.labels])
+    rows = {"all": np.ones(len(tested), dtype=np.bool_)}
+    rows |= {source: sources == source for source in SOURCES if source in sources}
+    return {
+        name: accuracy(
+            correct[:, chosen],
+            label_weights(tested.labels[chosen]),
+            tested.subjects[chosen],
+        )
+        for name, chosen in rows.items()
+    }
+
+
+def confusion_matrix(answers: Labels, truth: Labels, labels: Labels) -> Array:
+    """Returns the share of each true label (row) that was taken for each (column).
+
+    Args:
+        answers: indices into LABELS, shape (runs, N, 2).
+        truth: the same, shape (N,).
+        labels: of rows and columns, shape (L,).
+    """
+    matrix = np.zeros((len(labels), len(labels)))
+    for row, label in enumerate(labels):
+        given = answers[:, truth == label]
+        if given.size:
+            matrix[row] = [(given == other).mean() for other in labels]
+    return matrix

@@ -1,0 +1,115 @@
+"""Recorded motion of a robot, on the two sides of the split, to compare with."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+from loco_drake.datasets.segments import Segment, read_segments, select_labels
+from loco_drake.datasets.split import VALIDATION, Split
+from loco_drake.errors import InputError
+from loco_drake.evaluation.samples import FRAMES
+from loco_drake.gaits import LABELS
+from loco_drake.models.robots import Robot, get_robot
+from loco_drake.motion import Motion, load_motion
+from loco_drake.parallel import map_in_workers
+from loco_drake.retargeting.batch import SegmentRetargeter
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """Retargeted stretches of recordings; no subject is on both sides.
+
+    Attributes:
+        train: what models learn from.
+        validation: what they have not seen.
+        failed: stretches that could not be retargeted, and why.
+    """
+
+    train: tuple[Motion, ...]
+    validation: tuple[Motion, ...]
+    failed: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels that both sides have a trajectory of, in the order of LABELS."""
+        sides = [
+            {str(m.label) for m in side if len(m) >= FRAMES}
+            for side in (self.train, self.validation)
+        ]
+        return tuple(str(k) for k in LABELS if all(str(k) in side for side in sides))
+
+
+class _Retarget:
+    """Retargets one segment, see :func:`retarget_recordings`."""
+
+    def __init__(self, robot: str, split: Split) -> None:
+        self._retarget = SegmentRetargeter(get_robot(robot), split)
+
+    def __call__(self, segment: Segment) -> tuple[str, Motion | str]:
+        result = self._retarget(segment)
+        return segment.name, result if isinstance(result, str) else result[1]
+
+
+def retarget_recordings(
+    data_dir: Path, robot: Robot, labels: Iterable[str] = (), workers: int = 1
+) -> Recorded:
+    """Retargets the recordings of the fifteen labels.
+
+    Args:
+        data_dir: holds ``segments.csv``.
+        robot: to move.
+        labels: only these; default: all of the fifteen that there are.
+        workers: processes.
+
+    Raises:
+        InputError: if the folder is unsound, or has nothing of a label.
+    """
+    segments = read_segments(data_dir)
+    names = {str(label) for label in LABELS}
+    wanted = [s for s in select_labels(segments, labels) if s.label in names]
+    make = partial(_Retarget, robot.name, Split(segments))
+    motions, failed = [], {}
+    for name, result in map_in_workers(make, wanted, workers):
+        if isinstance(result, str):
+            failed[name] = result
+        else:
+            motions.append(result)
+    return by_split(motions, failed)
+
+
+def by_split(
+    motions: Sequence[Motion], failed: dict[str, str] | None = None
+) -> Recorded:
+    """Returns motions on the side of the split that their provenance names.
+
+    Motions that name none are for training.
+    """
+    held = [m.provenance.get("split") == VALIDATION for m in motions]
+    return Recorded(
+        train=tuple(m for m, out in zip(motions, held, strict=True) if not out),
+        validation=tuple(m for m, out in zip(motions, held, strict=True) if out),
+        failed=failed or {},
+    )
+
+
+def load_recorded(folder: Path) -> tuple[Robot, Recorded]:
+    """Reads the Motion files under ``folder`` that are of one of the fifteen labels.
+
+    Returns:
+        The robot that all are of, and its motions.
+
+    Raises:
+        InputError: if there are none, or of several robots, or one is unsound.
+    """
+    folder = Path(folder)
+    motions = [load_motion(path) for path in sorted(folder.rglob("*.npz"))]
+    motions = [motion for motion in motions if motion.label in LABELS]
+    robots = sorted({motion.robot for motion in motions})
+    if len(robots) != 1:
+        found = f"of {', '.join(robots)}" if robots else "none"
+        raise InputError(
+            f"{str(folder)!r} must hold Motion files (*.npz) of one robot with labels "
+            f"such as {LABELS[0]}; there are {found}."
+        )
+    return get_robot(robots[0]), by_split(motions)

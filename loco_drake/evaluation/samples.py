@@ -1,0 +1,180 @@
+"""Trajectories of 2 s as numbers that tell how a robot moves, not where.
+
+All that compares real with generated motion starts from these. They are computed from
+base and joints alone: contact labels, which a generator writes too, are left out.
+
+Channels
+    Those of :mod:`loco_drake.generation.features` up to the joints: velocity of the
+    base in its heading frame, yaw rate, height, roll, pitch, twelve joint angles.
+    Where a trajectory begins and which way it heads makes no difference.
+Summary
+    For each channel its mean over time, its standard deviation, and the root mean
+    squares of its change from frame to frame and of the change of that; then the
+    correlations of the six pairs of thigh angles, which tell a pace from a trot. All
+    are rounded to RESOLUTION: a roll that is exactly zero in one set and a hundred
+    thousandth of a radian in the other is no difference.
+Mirror image
+    Left and right are a matter of chance in recordings, and generators learn from
+    mirror images too. Each trajectory therefore counts with its mirror image, one half
+    each: to prefer a side is no gait of its own.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.generation.features import (
+    CONTACTS,
+    JOINTS,
+    VELOCITY,
+    YAW_RATE,
+    motion_features,
+)
+from loco_drake.models.robots import Robot
+from loco_drake.motion import FPS, Motion
+
+Array = NDArray[np.float64]
+
+SECONDS = 2.0  # the paper's length of a trajectory
+FRAMES = round(SECONDS * FPS)
+CHANNELS = CONTACTS.start
+_THIGHS = slice(JOINTS.start + 1, JOINTS.stop, 3)
+_PAIRS = np.triu_indices(4, k=1)
+# Where each part of a summary lies.
+SUMMARY = {
+    "mean": slice(0, CHANNELS),
+    "spread": slice(CHANNELS, 2 * CHANNELS),
+    "change": slice(2 * CHANNELS, 3 * CHANNELS),
+    "change of change": slice(3 * CHANNELS, 4 * CHANNELS),
+    "correlation": slice(4 * CHANNELS, 4 * CHANNELS + len(_PAIRS[0])),
+}
+SUMMARY_SIZE = SUMMARY["correlation"].stop
+# In the units of the channels: .3 mm/s, .001 rad/s, .03 mm, .0001 rad.
+RESOLUTION = np.full(SUMMARY_SIZE, 1e-4)
+for _part in list(SUMMARY.values())[:4]:
+    RESOLUTION[_part][VELOCITY] = RESOLUTION[_part][YAW_RATE] = 1e-3
+RESOLUTION[SUMMARY["correlation"]] = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Trajectories of FRAMES frames, each with its mirror image.
+
+    Attributes:
+        channels: shape (N, 2, FRAMES, CHANNELS); mirror images come second.
+        summaries: shape (N, 2, SUMMARY_SIZE).
+        labels: index into gaits.LABELS, shape (N,).
+        subjects: who or what was recorded, see :func:`subject_of`, shape (N,);
+            trajectories of one subject are not independent.
+    """
+
+    channels: Array
+    summaries: Array
+    labels: NDArray[np.int64]
+    subjects: NDArray[np.str_]
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    def __getitem__(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> "Samples":
+        """Returns those that a mask or indices choose."""
+        return Samples(
+            self.channels[index],
+            self.summaries[index],
+            self.labels[index],
+            self.subjects[index],
+        )
+
+
+def make_samples(robot: Robot, trajectories: Sequence[Motion]) -> Samples:
+    """Returns trajectories as samples; frames after the first FRAMES are left out.
+
+    Motions without a subject in their provenance are subjects of their own.
+
+    Args:
+        robot: that of the motions.
+        trajectories: at least FRAMES frames each, of one of the fifteen labels.
+    """
+    channels = np.empty((len(trajectories), 2, FRAMES, CHANNELS))
+    for i, motion in enumerate(trajectories):
+        for side, variant in enumerate((motion, motion.mirrored())):
+            features = motion_features(robot, variant.slice(0, FRAMES))
+            channels[i, side] = features[:, :CHANNELS]
+    return Samples(
+        channels=channels,
+        summaries=summarize(channels),
+        labels=np.array([m.label.index for m in trajectories], dtype=np.int64),
+        subjects=np.array(
+            [subject_of(m) or f"motion {i}" for i, m in enumerate(trajectories)],
+            dtype=np.str_,
+        ),
+    )
+
+
+def subject_of(motion: Motion) -> str | None:
+    """Returns the animal that a motion says was recorded, else the recording."""
+    named = (motion.provenance.get(key) for key in ("animal", "recording", "file"))
+    name = next(filter(None, named), None)
+    return f"{motion.source}-{name}" if name else None
+
+
+def join(parts: Sequence[Samples]) -> Samples:
+    """Returns all samples of ``parts``, in their order."""
+    return Samples(
+        np.concatenate([part.channels for part in parts]),
+        np.concatenate([part.summaries for part in parts]),
+        np.concatenate([part.labels for part in parts]),
+        np.concatenate([part.subjects for part in parts]),
+    )
+
+
+def summarize(channels: Array) -> Array:
+    """Returns summaries (..., SUMMARY_SIZE) of channels (..., T, CHANNELS)."""
+    change = np.diff(channels, axis=-2)
+    turn = np.diff(change, axis=-2)
+    thighs = channels[..., _THIGHS]
+    thighs = thighs - thighs.mean(axis=-2, keepdims=True)
+    thighs /= np.maximum(thighs.std(axis=-2, keepdims=True), 1e-3)
+    correlation = np.einsum("...ti,...tj->...ij", thighs, thighs) / channels.shape[-2]
+    summary = np.concatenate(
+        (
+            channels.mean(axis=-2),
+            channels.std(axis=-2),
+            np.sqrt((change**2).mean(axis=-2)),
+            np.sqrt((turn**2).mean(axis=-2)),
+            correlation[..., _PAIRS[0], _PAIRS[1]],
+        ),
+        axis=-1,
+    )
+    rounded: Array = np.round(summary / RESOLUTION) * RESOLUTION
+    return rounded
+
+
+def label_weights(labels: NDArray[np.int64]) -> Array:
+    """Returns a weight for each sample, shape (N,), summing to 1.
+
+    All labels weigh the same, however many samples each has; so do the samples of a
+    label.
+    """
+    present, place, count = np.unique(labels, return_inverse=True, return_counts=True)
+    weights: Array = 1.0 / (len(present) * count[place])
+    return weights
+
+
+def choose_per_label(
+    samples: Samples, counts: dict[int, int], random: np.random.Generator
+) -> Samples:
+    """Returns at most ``counts[label]`` samples of each label, drawn at random."""
+    chosen = []
+    for label in np.unique(samples.labels):
+        rows = random.permutation(np.flatnonzero(samples.labels == label))
+        chosen.append(rows[: counts.get(int(label), 0)])
+    return samples[np.sort(np.concatenate(chosen))]
+
+
+def count_per_label(samples: Samples) -> dict[int, int]:
+    """Returns how many samples there are of each label."""
+    labels, counts = np.unique(samples.labels, return_counts=True)
+    return {int(k): int(n) for k, n in zip(labels, counts, strict=True)}

@@ -1,0 +1,102 @@
+"""Windows of clips that the tokenizer learns from."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from torch import Tensor
+
+from loco_drake.generation.features import CONTACTS, VELOCITY, YAW_RATE
+from loco_drake.generation.library import Clip, Sampler
+
+Array = NDArray[np.float64]
+
+WINDOW = 64  # frames
+TEMPO = 1.15  # windows are played at most this much faster or slower
+
+
+class PairedWindows:
+    """Draws windows of clips, each with what another robot does at the same time.
+
+    A token must mean the same motion to all robots. So the tokens of a window are
+    decoded for its own robot, and for another one that was given the same stretch of
+    the same recording to follow, where there is one.
+
+    Args:
+        clips: at least WINDOW frames each.
+        robots: names of the robots that the tokenizer knows, in its order.
+    """
+
+    def __init__(self, clips: Sequence[Clip], robots: Sequence[str]) -> None:
+        self._clips = clips
+        self._robots = robots
+        self._sampler = Sampler(clips)
+        self._curves = {
+            clip: CubicSpline(np.arange(len(clip)), clip.features) for clip in clips
+        }
+        together: dict[str, list[Clip]] = {}
+        for clip in clips:
+            if clip.performance:
+                together.setdefault(clip.performance, []).append(clip)
+        self._others = {
+            clip: [
+                other
+                for other in together.get(clip.performance, ())
+                if other.robot != clip.robot
+            ]
+            for clip in clips
+        }
+        self._paired = any(self._others.values())
+
+    def __call__(
+        self, random: np.random.Generator, count: int
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Returns windows (N, WINDOW, SIZE), their robots (N,) and their labels (N,).
+
+        Labels are indices into gaits.LABELS.
+
+        N is ``count``; or twice as many if there are clips of several robots: then the
+        second half are the same windows of other robots.
+        """
+        chosen = [self._clips[i] for i in self._sampler(random, count)]
+        cuts = [draw_cut(len(clip), random) for clip in chosen]
+        if self._paired:
+            others = [self._others[clip] or [clip] for clip in chosen]
+            chosen += [among[random.integers(len(among))] for among in others]
+            cuts += cuts
+        frames = [
+            cut_window(self._curves[clip], *cut)
+            for clip, cut in zip(chosen, cuts, strict=True)
+        ]
+        return (
+            torch.tensor(np.stack(frames), dtype=torch.float32),
+            torch.tensor([self._robots.index(clip.robot) for clip in chosen]),
+            torch.tensor([clip.label.index for clip in chosen]),
+        )
+
+
+def draw_cut(frames: int, random: np.random.Generator) -> tuple[float, float]:
+    """Returns where in a clip to begin a window, and the tempo to play it at."""
+    last = frames - 1
+    fastest = min(TEMPO, last / (WINDOW - 1))
+    tempo = min(TEMPO ** random.uniform(-1, 1), fastest)
+    return random.uniform(0, last - tempo * (WINDOW - 1)), tempo
+
+
+def cut_window(curve: CubicSpline, start: float, tempo: float) -> Array:
+    """Returns WINDOW frames from ``start`` on, played ``tempo`` times as fast.
+
+    Feet that stand still do so at any tempo.
+
+    Args:
+        curve: the features of a clip over its frame numbers.
+        start: frame number, not whole.
+        tempo: above 0.
+    """
+    window: Array = curve(start + tempo * np.arange(WINDOW))
+    window[:, VELOCITY] *= tempo
+    window[:, YAW_RATE] *= tempo
+    window[:, CONTACTS] = window[:, CONTACTS] > 0.5
+    return window
