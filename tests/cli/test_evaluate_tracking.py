@@ -36,7 +36,6 @@ def test_json_has_the_agreed_shape(tmp_path, capsys):
         ("--robot spot", "choices are go2, a1, all"),
         ("--reference dog", "choices are generated, retargeted"),
         ("--labels dog-hop", "Unknown gait 'dog-hop'"),
-        ("--labels solo8-wave", "was not trained on solo8-wave"),
         ("--seeds 0", "--seeds must be 1 or more"),
         ("--duration nan", "duration must be above 0"),
         ("--contact glue", "choices are similar, lagged, sap, cenic"),

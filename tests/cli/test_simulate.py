@@ -34,8 +34,8 @@ def weights(tmp_path_factory):
         last = actor.layers[-1]
         with torch.no_grad():
             last.weight.zero_()
-            # Stretches the legs of one side and folds those of the other.
-            last.bias.copy_(bias * torch.tensor([0, 1, 1, 0, -1, -1] * 2))
+            # Stretches the front legs and folds the rear ones.
+            last.bias.copy_(bias * torch.tensor([0, 1, 1] * 2 + [0, -1, -1] * 2))
         save_actor(actor, folder / f"{name}.safetensors")
     return folder
 
