@@ -31,10 +31,10 @@ class TrainGenerator:
     """Weights from `train tokenizer`."""
     out: Path = Path("runs/generator")
     """Folder for the weights (generator.safetensors), checkpoint and logs."""
-    books: int = 3
+    books: int = 4
     """Codebooks of the tokenizer that it writes, the coarsest first. Finer ones hold
     what is too irregular to be predicted."""
-    steps: int = 3000
+    steps: int = 6000
     """Optimizer steps."""
     stitched: int = STITCHED
     """Motions of 20 s that are made of the clips to learn from, for each gait."""

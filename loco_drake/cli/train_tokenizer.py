@@ -25,7 +25,7 @@ class TrainTokenizer:
     validation are held out to test on."""
     out: Path = Path("runs/tokenizer")
     """Folder for the weights (tokenizer.safetensors), checkpoint and logs."""
-    steps: int = 6000
+    steps: int = 9000
     """Optimizer steps."""
     learning_rate: float = 2e-3
     """Highest learning rate."""

@@ -32,7 +32,7 @@ GROWTH = 12  # tokens by which a window grows while a chunk is written
 NO_HISTORY = 0.15  # share of windows that begin a sequence
 # Long motions to learn from, on average for each robot and label: tokens depend on
 # where a motion is cut into them, so that the same clips are worth seeing many times.
-STITCHED = 150
+STITCHED = 50
 STITCHED_SECONDS = 20.0  # each
 CORRUPTION = 0.1  # share of input codes replaced, so that mistakes can be mended
 
