@@ -67,7 +67,8 @@ class TrainTracker:
             seed=self.seed,
             environment=EnvironmentConfig(robot=self.robot, plant=self.plant),
         )
-        torch.set_num_threads(max(1, self.workers))
+        # A second thread gains little, and spins where another program has its core.
+        torch.set_num_threads(1)
         bar = Progress(
             TextColumn("steps"),
             BarColumn(),
