@@ -127,11 +127,10 @@ class BarePlant:
         return sum(self._follow(episode) for episode in episodes)
 
     def _follow(self, episode: Episode) -> float:
-        robot, plan, first = self._robot, episode.plan, episode.first
+        plan, first = episode.plan, episode.first
         self._restart(plan.state[first])
         samples = np.minimum(first + 1 + np.arange(episode.steps), len(plan) - 1)
-        forward = (robot.kd * plan.v[samples, 6:] + plan.torques[samples]) / robot.kp
-        return self._advance(plan.q[samples, 7:] + forward)
+        return self._advance(plan.set_points[samples])
 
     def stand(self, steps: int) -> float:
         """Stands still for ``steps``; returns the seconds they took."""

@@ -28,10 +28,10 @@ class JointTargets(LeafSystem):
 
     Every PLAN_DT it samples its inputs and sets
 
-        q_d = q_ref + ACTION_SCALE * action + (kd v_ref + tau_ref) / kp
+        q_d = set_points + ACTION_SCALE * action
 
-    with the plan's positions, velocities and feed-forward torques at t + PLAN_DT. All
-    act through the position: the desired velocity is sent as zero, since Drake's CENIC
+    with the plan's set-points at t + PLAN_DT, which hold its positions, velocities and
+    feed-forward torques: the desired velocity is sent as zero, since Drake's CENIC
     integrator (1.51) takes it with the wrong sign; the torque kp (q_d - q) - kd v is
     the same either way. The sampling is an unrestricted update, which Drake
     performs before the plant's discrete update at the same time: the action reaches
@@ -41,11 +41,13 @@ class JointTargets(LeafSystem):
     def __init__(self, robot: Robot) -> None:
         super().__init__()
         self._size = len(robot.joint_names)
-        self._kp, self._kd = robot.kp, robot.kd
         self._plan = self.DeclareAbstractInputPort("plan", Value(standing_plan(robot)))
         self._action = self.DeclareVectorInputPort("action", self._size)
+        # The action, the desired positions, and the desired velocities, which are zero.
         self._held = self.DeclareDiscreteState(
-            np.concatenate((np.zeros(self._size), robot.stand_joints))
+            np.concatenate(
+                (np.zeros(self._size), robot.stand_joints, np.zeros(self._size))
+            )
         )
         state = {self.discrete_state_ticket(self._held)}
         self.DeclareVectorOutputPort(
@@ -65,17 +67,14 @@ class JointTargets(LeafSystem):
         plan = self._plan.Eval(context)
         action = self._action.Eval(context)
         k = plan.index(context.get_time() + PLAN_DT)
-        feed_forward = (self._kd * plan.v[k, 6:] + plan.torques[k]) / self._kp
-        targets = plan.q[k, 7:] + ACTION_SCALE * action + feed_forward
-        held = state.get_mutable_discrete_state(int(self._held))
-        held.set_value(np.concatenate((action, targets)))
+        held = state.get_mutable_discrete_state(int(self._held)).get_mutable_value()
+        held[: self._size] = action
+        held[self._size : 2 * self._size] = plan.set_points[k] + ACTION_SCALE * action
         return EventStatus.Succeeded()
 
     def _calc_desired_state(self, context: Context, output: Any) -> None:
         held = context.get_discrete_state(int(self._held)).value()
-        desired = np.zeros(2 * self._size)
-        desired[: self._size] = held[self._size :]
-        output.set_value(desired)
+        output.set_value(held[self._size :])
 
     def _calc_action(self, context: Context, output: Any) -> None:
         held = context.get_discrete_state(int(self._held)).value()

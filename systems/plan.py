@@ -19,7 +19,7 @@ from .feed_forward import feed_forward_torques
 Array = NDArray[np.float64]
 
 PLAN_DT = 1.0 / FPS
-_ARRAYS = ("q", "v", "torques", "p_WF", "contacts", "labels", "path_time")
+_ARRAYS = ("q", "v", "set_points", "p_WF", "contacts", "labels", "path_time")
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,8 @@ class Plan:
         start_time: context time in s of the first sample.
         q: positions, shape (N, 7 + J).
         v: velocities, shape (N, 6 + J).
-        torques: feed-forward of the joints in Nm, shape (N, J).
+        set_points: of the joints' PD, in rad, shape (N, J): the positions, and beyond
+            them what the damping and the feed-forward torques need.
         p_WF: centres of the toe spheres in m, shape (N, 4, 3).
         contacts: whether each foot is meant to be on the ground, shape (N, 4).
         labels: index into :data:`loco_drake.gaits.LABELS`, shape (N,).
@@ -49,7 +50,7 @@ class Plan:
     start_time: float
     q: Array
     v: Array
-    torques: Array
+    set_points: Array
     p_WF: Array
     contacts: NDArray[np.bool_]
     labels: NDArray[np.int64]
@@ -110,13 +111,18 @@ def make_plan(
     path_time: Array | None = None,
     open_ended: bool = False,
 ) -> Plan:
-    """Returns a Plan; toes and feed-forward torques follow from the robot's model."""
+    """Returns a Plan; toes and set-points follow from the robot's model.
+
+    The set-points are q + (kd v + tau) / kp, with the gains of the PD and the torques
+    tau of :func:`feed_forward_torques`: all act through the position.
+    """
     p_BF = toe_positions(robot, q[:, 7:])
     p_WF = q[:, None, 4:7] + quat_rotate(q[:, None, :4], p_BF)
     written = PLAN_DT * np.arange(len(q), dtype=np.float64)
     times = written if path_time is None else path_time
     torques = feed_forward_torques(robot, q, v, contacts)
-    return Plan(start_time, q, v, torques, p_WF, contacts, labels, times, open_ended)
+    set_points = q[:, 7:] + (robot.kd * v[:, 6:] + torques) / robot.kp
+    return Plan(start_time, q, v, set_points, p_WF, contacts, labels, times, open_ended)
 
 
 def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> Plan:
