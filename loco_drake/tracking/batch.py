@@ -39,7 +39,6 @@ class _Robot:
     """One robot: a Context of the diagram, and the simulator that advances it."""
 
     def __init__(self, diagram: Diagram, plant: PlantConfig) -> None:
-        self._diagram = diagram
         self._simulator = Simulator(diagram, diagram.CreateDefaultContext())
         ConfigureSimulator(self._simulator, plant)
         self._context = self._simulator.get_mutable_context()
@@ -47,12 +46,15 @@ class _Robot:
         self._plant_context = self._plant.GetMyMutableContextFromRoot(self._context)
         self._player = diagram.GetSubsystemByName("reference")
         self._player_context = self._player.GetMyMutableContextFromRoot(self._context)
+        self._targets = diagram.GetSubsystemByName("joint_targets")
+        self._targets_context = self._targets.GetMyMutableContextFromRoot(self._context)
         action = diagram.GetInputPort("action").FixValue(self._context, np.zeros(12))
         self._action = action.GetMutableData()
 
     def reset(self, plan: Plan, sample: int, state: Array) -> None:
         """Puts the robot in ``state``, at a sample of the plan that it is to follow."""
-        self._diagram.SetDefaultContext(self._context)
+        # What is set here is all the state there is.
+        self._targets.SetDefaultContext(self._targets_context)
         self._context.SetTime(sample * PLAN_DT)
         self._player.SetPlan(self._player_context, plan)
         self._plant.SetPositionsAndVelocities(self._plant_context, state)
@@ -93,6 +95,12 @@ class TrackingBatch:
         diagram = _diagram(config.robot, plant.contact, plant.time_step, plant.friction)
         self._robots = [_Robot(diagram, plant) for _ in range(count)]
         self._lengths = np.array([len(plan) for plan in plans])
+        # All samples of all plans, one after the other, for one look-up a step.
+        self._first = np.cumsum(self._lengths) - self._lengths
+        self._wanted = np.concatenate([plan.state for plan in plans])
+        self._toes = np.concatenate([plan.p_BoF_H for plan in plans])
+        self._contacts = np.concatenate([plan.contacts for plan in plans])
+        self._labels = np.concatenate([plan.labels for plan in plans])
         self.plan = np.zeros(count, dtype=np.int64)
         self.start = np.zeros(count, dtype=np.int64)
         self.sample = np.zeros(count, dtype=np.int64)
@@ -144,26 +152,22 @@ class TrackingBatch:
         self.sample += 1
         for i, robot in enumerate(self._robots):
             self._state[i] = robot.advance(self._action[i], int(self.sample[i]))
-        at = list(zip(self.plan.tolist(), self.sample.tolist(), strict=True))
-        wanted = np.stack([self._plans[p].state[k] for p, k in at])
-        toes = np.stack([self._plans[p].p_BoF_H[k] for p, k in at])
+        now = self._first[self.plan] + self.sample
+        wanted, toes = self._wanted[now], self._toes[now]
         terms = reward_terms(self._robot, wanted, toes, self._state)
         lost = is_lost(self._robot, self._config.termination, self._state, wanted)
         return terms, lost, ~lost & (self.sample >= self._last)
 
     def observe(self) -> NDArray[np.float32]:
         """Returns the observations of all robots, shape (B, OBSERVATION_SIZE)."""
-        last = self._lengths[self.plan] - 1
+        first, last = self._first[self.plan], self._lengths[self.plan] - 1
         ahead = np.minimum(self.sample[:, None] + LOOK_AHEAD, last[:, None])
-        plans = [self._plans[p] for p in self.plan]
-        pairs = list(zip(plans, ahead, strict=True))
+        rows = first[:, None] + ahead
         shown = Preview(
-            q=np.stack([plan.q[k] for plan, k in pairs]),
-            v=np.stack([plan.v[k] for plan, k in pairs]),
-            contacts=np.stack([plan.contacts[k] for plan, k in pairs]),
-            label=np.array(
-                [plan.labels[k] for plan, k in zip(plans, self.sample, strict=True)]
-            ),
+            q=self._wanted[rows, :19],
+            v=self._wanted[rows, 19:],
+            contacts=self._contacts[rows],
+            label=self._labels[first + self.sample],
         )
         observations = observe(self._robot, shown, self._state, self._action)
         return observations.astype(np.float32)
