@@ -22,3 +22,10 @@ def check_choice(what: str, value: str, choices: Iterable[str]) -> str:
             f"Unknown {what} {value!r}; the choices are {', '.join(choices)}."
         )
     return value
+
+
+def check_at_least(option: str, value: int, least: int) -> None:
+    """Raises InputError if ``value`` is below ``least``."""
+    if value < least:
+        name = option.replace("_", "-")
+        raise InputError(f"--{name} must be {least} or more, not {value}.")

@@ -7,7 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
-from loco_drake.errors import InputError
+from loco_drake.errors import check_at_least
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -36,8 +36,7 @@ def map_in_workers(
         InputError: if ``workers`` is below 1.
         ChildProcessError: if a worker process is killed.
     """
-    if workers < 1:
-        raise InputError(f"--workers must be 1 or more, not {workers}.")
+    check_at_least("workers", workers, 1)
     return _map_here(make, items) if workers == 1 else _map(make, items, workers)
 
 

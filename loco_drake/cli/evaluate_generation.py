@@ -8,7 +8,6 @@ from typing import Any
 from rich.console import Console
 
 from loco_drake.cli.evaluation import (
-    check_at_least,
     estimate_text,
     of_robots,
     robot_names,
@@ -21,7 +20,7 @@ from loco_drake.cli.output import (
     write_json,
 )
 from loco_drake.datasets.registry import data_dir
-from loco_drake.errors import InputError
+from loco_drake.errors import InputError, check_at_least
 from loco_drake.evaluation.generation import Generated, GenerationScore
 from loco_drake.evaluation.generation_pictures import confusion_figure, motion_figure
 from loco_drake.evaluation.model_figures import Effort, score_model, score_motions

@@ -10,7 +10,7 @@ from rich.progress import Progress
 from loco_drake.cli.output import print_failed, print_figures, write_json
 from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments, select_labels
-from loco_drake.errors import InputError, check_choice
+from loco_drake.errors import check_at_least, check_choice
 from loco_drake.evaluation.retargeting import score_segments, summarize
 from loco_drake.models.robot_files import is_robot_file, load_robot
 from loco_drake.models.robots import ROBOTS
@@ -52,8 +52,7 @@ class EvaluateRetargeting:
         """
         if not is_robot_file(self.robot):
             check_choice("robot", self.robot, (*ROBOTS, "all"))
-        if self.seeds < 1:
-            raise InputError(f"--seeds must be 1 or more, not {self.seeds}.")
+        check_at_least("seeds", self.seeds, 1)
         segments = select_labels(read_segments(data_dir(self.data_dir)), self.labels)
         definitions = ROBOTS if self.robot == "all" else (self.robot,)
         models = {robot.name: robot for robot in map(load_robot, definitions)}

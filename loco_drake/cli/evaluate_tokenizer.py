@@ -5,14 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from loco_drake.cli.evaluation import (
-    check_at_least,
     of_robots,
     robot_names,
     write_figure,
 )
 from loco_drake.cli.output import print_failed, print_table, write_json
 from loco_drake.datasets.registry import data_dir
-from loco_drake.errors import InputError
+from loco_drake.errors import InputError, check_at_least
 from loco_drake.evaluation.generation_pictures import code_use_figure
 from loco_drake.evaluation.recorded import retarget_recordings
 from loco_drake.evaluation.tokenizer import evaluate_tokenizer

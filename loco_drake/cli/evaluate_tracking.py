@@ -10,7 +10,7 @@ from rich.progress import Progress
 from loco_drake.cli.output import print_figures, write_json
 from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments
-from loco_drake.errors import InputError, check_choice
+from loco_drake.errors import check_at_least, check_choice
 from loco_drake.evaluation.tracking_table import (
     Trial,
     generated_trials,
@@ -75,8 +75,7 @@ class EvaluateTracking:
         check_choice("robot", self.robot, (*ROBOTS, "all"))
         check_choice("reference", self.reference, ("generated", "retargeted"))
         check_duration(self.duration)
-        if self.seeds < 1:
-            raise InputError(f"--seeds must be 1 or more, not {self.seeds}.")
+        check_at_least("seeds", self.seeds, 1)
         names = list(ROBOTS) if self.robot == "all" else [self.robot]
         plans = {name: self._plan(name) for name in names}
         results = {name: self._evaluate(name, *plan) for name, plan in plans.items()}

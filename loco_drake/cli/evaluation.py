@@ -11,13 +11,6 @@ from loco_drake.files import atomic_path
 from loco_drake.models.robots import ROBOTS
 
 
-def check_at_least(option: str, value: int, least: int) -> None:
-    """Raises InputError if ``value`` is below ``least``."""
-    if value < least:
-        name = option.replace("_", "-")
-        raise InputError(f"--{name} must be {least} or more, not {value}.")
-
-
 def of_robots(
     robot: str, evaluate: Callable[[str], dict[str, Any]], keys: Iterable[str]
 ) -> dict[str, Any]:

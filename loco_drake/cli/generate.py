@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from loco_drake.cli.output import print_table, write_json
-from loco_drake.errors import InputError, check_choice
+from loco_drake.errors import InputError, check_at_least, check_choice
 from loco_drake.gaits import parse_label
 from loco_drake.generation.generate import (
     check_duration,
@@ -57,8 +57,7 @@ class Generate:
         check_duration(self.duration)
         check_sampling(self.temperature, self.top_p)
         check_choice("robot", self.robot, ROBOTS)
-        if self.count < 1:
-            raise InputError(f"--count must be 1 or more, not {self.count}.")
+        check_at_least("count", self.count, 1)
         if self.seed < 0:
             raise InputError(f"--seed must be 0 or more, not {self.seed}.")
         model = load_motion_model(

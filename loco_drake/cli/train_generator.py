@@ -6,7 +6,7 @@ from pathlib import Path
 
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.cli.training import check_steps, print_stopped
-from loco_drake.errors import InputError
+from loco_drake.errors import InputError, check_at_least
 from loco_drake.generation.generator import GeneratorConfig
 from loco_drake.generation.library import load_library
 from loco_drake.generation.tokenizer import load_tokenizer
@@ -54,8 +54,7 @@ class TrainGenerator:
             InputError: if an option is wrong.
         """
         check_steps(self.steps, self.learning_rate)
-        if self.stitched < 1:
-            raise InputError(f"--stitched must be 1 or more, not {self.stitched}.")
+        check_at_least("stitched", self.stitched, 1)
         library = load_library(*self.motions)
         tokenizer = load_tokenizer(self.tokenizer)
         if not 1 <= self.books <= tokenizer.config.books:

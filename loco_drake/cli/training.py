@@ -4,13 +4,12 @@ from math import isfinite
 
 from rich.console import Console
 
-from loco_drake.errors import InputError
+from loco_drake.errors import InputError, check_at_least
 
 
 def check_steps(steps: int, learning_rate: float) -> None:
     """Raises InputError unless the options of a training can be used."""
-    if steps < 1:
-        raise InputError(f"--steps must be 1 or more, not {steps}.")
+    check_at_least("steps", steps, 1)
     if not (isfinite(learning_rate) and learning_rate > 0):
         raise InputError(f"--learning-rate must be above 0, not {learning_rate:g}.")
 
