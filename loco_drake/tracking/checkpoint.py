@@ -36,6 +36,7 @@ def save_checkpoint(
     tensors["normalizer/mean"] = torch.from_numpy(statistics.mean)
     tensors["normalizer/variance"] = torch.from_numpy(statistics.var)
     tensors["sampler/scores"] = torch.from_numpy(sampler.scores)
+    tensors["sampler/shares"] = torch.from_numpy(sampler.shares)
     tensors["random/torch"] = torch.get_rng_state()
     # stable-baselines3 shuffles its minibatches with numpy's global generator.
     _, keys, position, has_gauss, gauss = np.random.get_state()  # noqa: NPY002
@@ -88,6 +89,7 @@ def restore(
     statistics.var = part("normalizer")["variance"].numpy()
     statistics.count = state["normalizer_count"]
     sampler.scores[:] = part("sampler")["scores"].numpy()
+    sampler.shares[:] = part("sampler")["shares"].numpy()
     sampler.random.bit_generator.state = state["sampler_random"]
     torch.set_rng_state(tensors["random/torch"])
     position, has_gauss, gauss = state["numpy_random"]

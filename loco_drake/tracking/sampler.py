@@ -10,10 +10,15 @@ _MEMORY = 0.98  # weight of the past in a label's score, per episode
 # Even a perfect gait is drawn now and then, so that it is not forgotten; and those that
 # hardly begin to work must not take the time of those that are being learned.
 _LEAST, _MOST = 0.1, 0.5
+_SHORTEST = 0.05  # share of an episode that the shortest are taken to last
 
 
 class PlanSampler:
-    """Draws labels in proportion to the return they lack, within bounds; then a plan.
+    """Draws labels so that they get steps in proportion to what they lack; then a plan.
+
+    A gait's share of the *steps*, not of the episodes, is proportional to the return
+    that it lacks, within bounds: episodes that end in an early fall are short, and what
+    falls would hardly be practised otherwise.
 
     Args:
         plans: what to draw from; the label of a plan is that of its first sample.
@@ -25,18 +30,28 @@ class PlanSampler:
         self.present = np.unique(self._labels)
         # Mean normalized return of recent episodes, 0 to 1, by label.
         self.scores: NDArray[np.float64] = np.zeros(len(LABELS))
+        # Mean share of their steps that recent episodes made, by label.
+        self.shares: NDArray[np.float64] = np.ones(len(LABELS))
         self.random = np.random.default_rng(seed)
 
     def draw(self) -> int:
         """Returns the index of a plan."""
         lack = np.clip(1 - self.scores[self.present], _LEAST, _MOST)
-        label = self.random.choice(self.present, p=lack / lack.sum())
+        episodes = lack / np.maximum(self.shares[self.present], _SHORTEST)
+        label = self.random.choice(self.present, p=episodes / episodes.sum())
         return int(self.random.choice(np.flatnonzero(self._labels == label)))
 
-    def record(self, plan: int, score: float) -> None:
-        """Takes note of the normalized return (0 to 1) of an episode on ``plan``."""
+    def record(self, plan: int, score: float, share: float) -> None:
+        """Takes note of an episode on ``plan``.
+
+        Args:
+            plan: index of the plan.
+            score: normalized return, 0 to 1.
+            share: steps that it made over those of an episode, 0 to 1.
+        """
         label = self._labels[plan]
-        self.scores[label] = _MEMORY * self.scores[label] + (1 - _MEMORY) * score
+        for mean, value in ((self.scores, score), (self.shares, share)):
+            mean[label] = _MEMORY * mean[label] + (1 - _MEMORY) * value
 
     def score_by_label(self) -> dict[str, float]:
         """Returns the mean normalized return of recent episodes, 0 to 100."""

@@ -94,6 +94,8 @@ class WorkerVecEnv(VecEnv):
         self._sampler = sampler
         self._episode_steps = config.episode_steps
         self._per_worker = per_worker
+        # What each environment goes on with when its episode is over.
+        self._next_plans = [sampler.draw() for _ in range(self.num_envs)]
         self._returns = np.zeros(self.num_envs)
         self._lengths = np.zeros(self.num_envs, dtype=int)
         # Fork would copy the threads' locks of torch and Drake.
@@ -115,6 +117,7 @@ class WorkerVecEnv(VecEnv):
     def reset(self) -> NDArray[np.float32]:
         """Starts a new episode everywhere; returns observations (num_envs, size)."""
         self._send(None)
+        self._next_plans = [self._sampler.draw() for _ in self._next_plans]
         self._returns[:] = 0
         self._lengths[:] = 0
         return np.concatenate(self._receive())
@@ -138,12 +141,17 @@ class WorkerVecEnv(VecEnv):
             steps = (
                 self._lengths[i] if info["TimeLimit.truncated"] else self._episode_steps
             )
-            self._sampler.record(info["plan"], self._returns[i] / steps)
+            self._sampler.record(
+                info["plan"],
+                self._returns[i] / steps,
+                self._lengths[i] / self._episode_steps,
+            )
             info["episode"] = {
                 "r": 100 * self._returns[i] / steps,
                 "l": int(self._lengths[i]),
                 "t": 0.0,
             }
+            self._next_plans[i] = self._sampler.draw()
             self._returns[i] = 0
             self._lengths[i] = 0
         return observations, rewards.astype(np.float32), dones, infos
@@ -163,9 +171,10 @@ class WorkerVecEnv(VecEnv):
     def _send(self, actions: NDArray[np.float32] | None) -> None:
         for w, pipe in enumerate(self._pipes):
             own = slice(w * self._per_worker, (w + 1) * self._per_worker)
-            next_plans = [self._sampler.draw() for _ in range(self._per_worker)]
             try:
-                pipe.send((None if actions is None else actions[own], next_plans))
+                pipe.send(
+                    (None if actions is None else actions[own], self._next_plans[own])
+                )
             except (BrokenPipeError, OSError):
                 raise RuntimeError("a worker process died") from None
 

@@ -162,9 +162,21 @@ def test_the_sampler_prefers_what_lacks_most(plans):
     assert share == pytest.approx(1 / 2, abs=0.03)
 
 
+def test_gaits_that_fall_early_still_get_their_steps(plans):
+    """Both lack half; trots last a tenth of an episode, so ten are drawn for a pace."""
+    sampler = PlanSampler(plans, 0)
+    sampler.scores[TROT] = sampler.scores[PACE] = 0.5
+    for _ in range(400):
+        sampler.record(0, 0.5, 0.1)
+        sampler.record(1, 0.5, 1.0)
+    draws = np.array([sampler.draw() for _ in range(3000)])
+    share = np.mean([plans[i].labels[0] == TROT for i in draws])
+    assert share == pytest.approx(10 / 11, abs=0.03)
+
+
 def test_scores_follow_what_episodes_return(plans):
     sampler = PlanSampler(plans, 0)
     for _ in range(400):
-        sampler.record(0, 0.8)
+        sampler.record(0, 0.8, 1.0)
     assert sampler.score_by_label()["dog-trot"] == pytest.approx(80, abs=0.1)
     assert sampler.score_by_label()["dog-pace"] == 0.0
