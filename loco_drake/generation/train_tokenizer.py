@@ -6,7 +6,7 @@ vector-quantize-pytorch. The finest books are left out at random, so that the de
 makes the best of the coarse ones alone.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -134,10 +134,27 @@ class LearningTokenizer(nn.Module):
         return self.tokenizer.eval()
 
 
+def residual_tokenizer(config: TokenizerConfig) -> LearningTokenizer:
+    """Returns the networks, untrained, that are trained by default."""
+    return LearningTokenizer(Tokenizer(config))
+
+
 def train_tokenizer(
-    library: Library, config: TokenizerConfig, settings: LoopSettings
+    library: Library,
+    config: TokenizerConfig,
+    settings: LoopSettings,
+    *,
+    weights: Mapping[str, float] = WEIGHTS,
+    build: Callable[[TokenizerConfig], LearningTokenizer] = residual_tokenizer,
 ) -> tuple[Tokenizer, LoopResult]:
     """Trains a tokenizer and writes ``tokenizer.safetensors`` if it was not stopped.
+
+    Args:
+        library: what to learn from.
+        config: sizes of the networks.
+        settings: of the training.
+        weights: of the losses, by the names in :data:`WEIGHTS`.
+        build: makes the networks.
 
     Raises:
         InputError: if no clip is as long as a window, or a robot of the library is
@@ -151,7 +168,7 @@ def train_tokenizer(
         raise InputError(f"The tokenizer is not to know {', '.join(missing)}.")
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
-        learning = LearningTokenizer(Tokenizer(config))
+        learning = build(config)
     with torch.no_grad():
         # To begin with a still picture: first to unlearn jitter kills most codes.
         learning.tokenizer.decoder_out.weight.mul_(0.01)
@@ -165,11 +182,11 @@ def train_tokenizer(
         target, robot, label = windows(random, BATCH)
         losses = tokenizer_losses(learning, toes, scales(label), target, robot, BATCH)
         total = sum(
-            (WEIGHTS[name] * loss for name, loss in losses.items()), torch.zeros(())
+            (weights[name] * loss for name, loss in losses.items()), torch.zeros(())
         )
         return total, {name: loss.item() for name, loss in losses.items()}
 
-    run = {"network": asdict(config), "weights": WEIGHTS}
+    run = {"network": asdict(config), "weights": dict(weights)}
     result = train("tokenizer", learning, loss_of_batch, settings, run)
     tokenizer = learning.finish()
     if not result.stopped:
