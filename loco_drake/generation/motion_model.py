@@ -195,7 +195,7 @@ class MotionModel:
         steps = self.chunk_tokens if tokens is None else tokens
         batch = len(stream.seeds)
         labels = np.asarray(labels, dtype=np.int64)
-        self._check_labels(labels)
+        self.check_labels(labels)
         new = np.broadcast_to(labels.reshape(batch, -1), (batch, steps))
         # The first tokens are only there for the decoder to look back at.
         lead = 0 if stream.chunk else self._lead
@@ -293,7 +293,8 @@ class MotionModel:
         after, q, contacts = step_footing(self.robot, start_footing(start), features)
         return after, q[:, -2:], contacts[:, -1:]
 
-    def _check_labels(self, labels: Integers) -> None:
+    def check_labels(self, labels: Integers) -> None:
+        """Raises InputError if the weights were not trained on one of ``labels``."""
         unknown = sorted(set(labels.ravel().tolist()) - self._known)
         if unknown:
             names = [str(LABELS[i]) if i < len(LABELS) else str(i) for i in unknown]
