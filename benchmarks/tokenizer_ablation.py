@@ -31,9 +31,9 @@ from loco_drake.files import atomic_path
 from loco_drake.generation.features import CONTACTS, JOINTS
 from loco_drake.generation.layers import CausalConv, ConvBlock
 from loco_drake.generation.library import load_library, motion_clip
+from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig
 from loco_drake.generation.tokenizer_score import clip_tensor
-from loco_drake.generation.toes import Toes
 from loco_drake.generation.train_tokenizer import (
     WEIGHTS,
     LearningTokenizer,
@@ -155,7 +155,9 @@ def bits_per_second(config: TokenizerConfig) -> float:
     return float(bits * FPS / config.frames_per_token)
 
 
-def decoded_figures(tokenizer: Tokenizer, motions: Sequence[Motion]) -> dict[str, float]:
+def decoded_figures(
+    tokenizer: Tokenizer, motions: Sequence[Motion]
+) -> dict[str, float]:
     """Returns what the decoder makes of motions of one robot, no feet put right.
 
     Returns:

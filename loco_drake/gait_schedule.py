@@ -73,7 +73,7 @@ def _seconds(part: str, time: str) -> float:
         seconds = float("nan")
     if not isfinite(seconds):
         raise InputError(
-            f"Each gait but the first needs the time in s at which it begins, {SYNTAX}, "
-            f"which {part!r} lacks."
+            f"Each gait but the first needs the time in s at which it begins, "
+            f"{SYNTAX}, which {part!r} lacks."
         )
     return seconds

@@ -54,10 +54,11 @@ class ReferenceGenerator(LeafSystem):
 
     ``path_time`` (s) is how much of the plan has been used up: what the smoother has
     committed; if it is not connected, the context's time. The configured gait may be a
-    schedule, whose times are on the plan's clock and are kept to a token. ``gait`` is an
-    index into :data:`loco_drake.gaits.LABELS` that overrides it for the chunks still to
-    be written, so that a change comes ``horizon`` and up to a chunk later. What is written depends only on seed, number of the chunk and
-    labels, so that a Context that is cloned or reset repeats it exactly.
+    schedule, whose times are on the plan's clock and are kept to a token. ``gait`` is
+    an index into :data:`loco_drake.gaits.LABELS` that overrides it for the chunks still
+    to be written, so that a change comes ``horizon`` and up to a chunk later. What is
+    written depends only on seed, number of the chunk and labels, so that a Context that
+    is cloned or reset repeats it exactly.
 
     Args:
         robot: the robot that is to move.
@@ -146,9 +147,7 @@ class ReferenceGenerator(LeafSystem):
         state.get_mutable_abstract_state(int(self._script)).set_value(new)
         return EventStatus.Succeeded()
 
-    def _written(
-        self, script: _Script, schedule: GaitSchedule, used: float
-    ) -> _Script:
+    def _written(self, script: _Script, schedule: GaitSchedule, used: float) -> _Script:
         """Returns ``script`` with chunks added until the horizon is reached."""
         while script.plan is None or (script.plan.path_time[-1] < used + self._horizon):
             stream, frames = self._model.extend(

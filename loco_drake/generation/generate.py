@@ -86,9 +86,7 @@ def generate_motions(
     ]
 
 
-def chunk_labels(
-    model: MotionModel, schedule: GaitSchedule, chunk: int
-) -> Integers:
+def chunk_labels(model: MotionModel, schedule: GaitSchedule, chunk: int) -> Integers:
     """Returns the labels of the tokens of a chunk, shape (model.chunk_tokens,).
 
     A token is of the gait that is due when its first frame is.

@@ -24,6 +24,7 @@ from loco_drake.generation.library import Clip, Library
 from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
 from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.generation.training_record import training_record
 from loco_drake.generation.windows import WINDOW, PairedWindows
 from loco_drake.models.robots import get_robot
 
@@ -190,7 +191,10 @@ def train_tokenizer(
     result = train("tokenizer", learning, loss_of_batch, settings, run)
     tokenizer = learning.finish()
     if not result.stopped:
-        info = {"labels": [str(label) for label in library.labels]}
+        info = {
+            "labels": [str(label) for label in library.labels],
+            "training": training_record(library, settings),
+        }
         save_tokenizer(tokenizer, Path(settings.out) / "tokenizer.safetensors", info)
     return tokenizer, result
 

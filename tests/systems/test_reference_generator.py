@@ -91,7 +91,7 @@ def test_a_new_gait_holds_from_the_next_chunk_on(generator):
 
 
 def test_a_schedule_is_kept_to_a_token(go2, model):
-    """Whatever is written ahead, the gait changes when it is due on the plan's clock."""
+    """However far ahead it writes, a gait begins when it is due on the plan's clock."""
     config = GeneratedReference(gait="dog-pace,dog-trot@1.5,dog-pace@4", seed=3)
     generator = ReferenceGenerator(go2, config, model)
     simulator = Simulator(generator)
