@@ -215,6 +215,17 @@ def test_the_command_writes_motions_and_figures(tmp_path):
     np.testing.assert_allclose(again.joint_positions, motion.joint_positions, atol=1e-4)
 
 
+def test_the_command_changes_the_gait_on_the_way(tmp_path):
+    gait = "dog-pace,dog-trot@1"
+    assert Generate(gait=gait, duration=2.0, out=tmp_path).run() == 0
+    (path,) = tmp_path.iterdir()
+    assert path.name == f"{gait}-0.npz"
+    motion = load_motion(path)
+    assert len(motion) == 101
+    assert str(motion.label) == "several-gaits"
+    assert motion.provenance["generated"] == f"{gait} for 2 s"
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
