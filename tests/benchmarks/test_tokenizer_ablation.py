@@ -65,6 +65,7 @@ def test_product_books_decode_what_was_quantized(script):
 
 def test_bits_by_hand(script):
     """8 books of 128 codes, 12.5 tokens a second: 8 * 7 * 12.5."""
-    assert script["bits_per_second"](TokenizerConfig()) == 700.0
+    eight = replace(TokenizerConfig(), books=8)
+    assert script["bits_per_second"](eight) == 700.0
     few = replace(TokenizerConfig(), books=2, frames_per_token=8)
     assert script["bits_per_second"](few) == 87.5
