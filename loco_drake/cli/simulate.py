@@ -16,6 +16,7 @@ from loco_drake.errors import InputError
 from loco_drake.evaluation.rollout import Recorder
 from loco_drake.evaluation.tracking import tracking_metrics
 from loco_drake.files import atomic_path
+from loco_drake.gait_schedule import parse_schedule
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import Motion, load_motion
@@ -37,7 +38,8 @@ class Simulate:
     robot: str = "go2"
     """Robot: go2 or a1."""
     gait: str = "dog-trot"
-    """Gait label, source-gait, such as dog-trot; ignored with a Motion file."""
+    """Gait label, source-gait, such as dog-trot; or several, the later ones with the
+    time in s at which they begin: dog-pace,dog-trot@3. Ignored with a Motion file."""
     duration: float = 10.0
     """Seconds to simulate; of a Motion file at most its length."""
     seed: int = 0
@@ -116,6 +118,7 @@ class Simulate:
         if self.duration < PLAN_DT:
             raise InputError(f"The duration must be at least {PLAN_DT} s.")
         if self.reference == "gpt":
+            parse_schedule(self.gait).check_ends_by(self.duration)
             return None
         if not Path(self.reference).is_file():
             raise InputError(

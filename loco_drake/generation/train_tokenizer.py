@@ -6,7 +6,7 @@ vector-quantize-pytorch. The finest books are left out at random, so that the de
 makes the best of the coarse ones alone.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from loco_drake.generation.library import Clip, Library
 from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
 from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.generation.training_record import training_record
 from loco_drake.generation.windows import WINDOW, PairedWindows
 from loco_drake.models.robots import get_robot
 
@@ -136,10 +137,27 @@ class LearningTokenizer(nn.Module):
         return self.tokenizer.eval()
 
 
+def residual_tokenizer(config: TokenizerConfig) -> LearningTokenizer:
+    """Returns the networks, untrained, that are trained by default."""
+    return LearningTokenizer(Tokenizer(config))
+
+
 def train_tokenizer(
-    library: Library, config: TokenizerConfig, settings: LoopSettings
+    library: Library,
+    config: TokenizerConfig,
+    settings: LoopSettings,
+    *,
+    weights: Mapping[str, float] = WEIGHTS,
+    build: Callable[[TokenizerConfig], LearningTokenizer] = residual_tokenizer,
 ) -> tuple[Tokenizer, LoopResult]:
     """Trains a tokenizer and writes ``tokenizer.safetensors`` if it was not stopped.
+
+    Args:
+        library: what to learn from.
+        config: sizes of the networks.
+        settings: of the training.
+        weights: of the losses, by the names in :data:`WEIGHTS`.
+        build: makes the networks.
 
     Raises:
         InputError: if no clip is as long as a window, or a robot of the library is
@@ -153,7 +171,7 @@ def train_tokenizer(
         raise InputError(f"The tokenizer is not to know {', '.join(missing)}.")
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
-        learning = LearningTokenizer(Tokenizer(config))
+        learning = build(config)
     with torch.no_grad():
         # To begin with a still picture: first to unlearn jitter kills most codes.
         learning.tokenizer.decoder_out.weight.mul_(0.01)
@@ -167,15 +185,18 @@ def train_tokenizer(
         target, robot, label = windows(random, BATCH)
         losses = tokenizer_losses(learning, toes, scales(label), target, robot, BATCH)
         total = sum(
-            (WEIGHTS[name] * loss for name, loss in losses.items()), torch.zeros(())
+            (weights[name] * loss for name, loss in losses.items()), torch.zeros(())
         )
         return total, {name: loss.item() for name, loss in losses.items()}
 
-    run = {"network": asdict(config), "weights": WEIGHTS}
+    run = {"network": asdict(config), "weights": dict(weights)}
     result = train("tokenizer", learning, loss_of_batch, settings, run)
     tokenizer = learning.finish()
     if not result.stopped:
-        info = {"labels": [str(label) for label in library.labels]}
+        info = {
+            "labels": [str(label) for label in library.labels],
+            "training": training_record(library, settings),
+        }
         save_tokenizer(tokenizer, Path(settings.out) / "tokenizer.safetensors", info)
     return tokenizer, result
 
