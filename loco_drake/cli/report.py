@@ -52,10 +52,11 @@ class Report:
             )
         with atomic_path(self.out) as temporary:
             temporary.write_text(report.html, encoding="utf-8")
+        size = self.out.stat().st_size
         figures = {
             "report": str(self.out),
             "results": str(folder),
-            "bytes": self.out.stat().st_size,
+            "bytes": size,
             "goals": report.counts,
             "missing": report.missing,
             "replays": [f"{robot} {label}" for robot, label in report.replays],
@@ -71,5 +72,5 @@ class Report:
         print_table("Goals", ("robot", "met", "measured"), rows)
         if report.missing:
             print_table("Missing results", ("file", "made by"), report.missing.items())
-        print(f"{self.out}: {figures['bytes'] / 1e6:.1f} MB")
+        print(f"{self.out}: {size / 1e6:.1f} MB")
         return 0

@@ -55,9 +55,7 @@ CONDITIONS = {
 }
 
 EXPECTED = (
-    ResultFile(
-        "retargeting", ROBOTS, "loco-drake evaluate retargeting --robot all"
-    ),
+    ResultFile("retargeting", ROBOTS, "loco-drake evaluate retargeting --robot all"),
     ResultFile("tokenizer", ROBOTS, "loco-drake evaluate tokenizer --robot all"),
     ResultFile("generation", ROBOTS, "loco-drake evaluate generation --robot all"),
     *(

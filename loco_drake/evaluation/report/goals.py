@@ -82,6 +82,7 @@ GOALS = (
         plain("tokenizer", "all", "joint_rmse_rad"),
         high=0.03,
         dream=("≤ .015", -inf, 0.015),
+        digits=4,
     ),
     Goal(
         _TOKENIZER,
@@ -213,7 +214,7 @@ GOALS = (
         _TRACKING,
         "episodes that end in a fall",
         "%",
-        "2.4 (Uni-Mo)",
+        "2.4 without success (Uni-Mo)",
         "≤ 2 of 10 s each",
         tracking("fall_rate", factor=100),
         high=2.0,

@@ -10,7 +10,7 @@ from loco_drake.evaluation.report import pictures, sections, table_one
 from loco_drake.evaluation.report.expected import CONDITIONS, EXPECTED
 from loco_drake.evaluation.report.measures import LEAST_RETURN
 from loco_drake.evaluation.report.networks import networks_table
-from loco_drake.evaluation.report.published import COMPARISONS, PAPER_STEPS
+from loco_drake.evaluation.report.published import COMPARISONS
 from loco_drake.evaluation.report.replays import Replay, share_pieces
 from loco_drake.evaluation.report.results import Results
 from loco_drake.evaluation.report.scoreboard import Line
@@ -58,6 +58,7 @@ def render(
         counts=counts,
         missing=results.missing,
         absent=results.absent,
+        found=results.found,
         commands={file.path: file.command for file in EXPECTED},
         conditions=CONDITIONS,
         gaits=pictures.gaits_picture(motions),
@@ -95,5 +96,4 @@ def _measured(results: Results) -> dict[str, Any]:
         "returns": pictures.returns_picture(tracking, aims) if tracking else None,
         "robustness": robustness if robustness.rows else None,
         "learning": pictures.learning_picture(learning) if learning else None,
-        "paper_steps": PAPER_STEPS,
     }

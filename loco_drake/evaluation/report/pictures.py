@@ -20,6 +20,8 @@ from loco_drake.gaits import LABELS, SOURCES
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import Motion
 
+_TALL = 15.0  # of 100: bars that a number fits into
+
 
 def gaits_picture(motions: Mapping[str, Sequence[Motion]]) -> str:
     """Returns the outlines of robots in each gait, a row each (Figure 1).
@@ -30,17 +32,15 @@ def gaits_picture(motions: Mapping[str, Sequence[Motion]]) -> str:
     robots = list(motions)
     count = len(motions[robots[0]])
     with page_style("gaits"):
-        figure = Figure(figsize=(11, 0.72 * count + 0.3), layout="constrained")
+        figure = Figure(figsize=(11, 0.6 * count + 0.3), layout="constrained")
         axes = figure.subplots(count, len(robots), squeeze=False)
         for column, name in enumerate(robots):
             axes[0, column].set_title(robot_title(name))
             for row, motion in enumerate(motions[name]):
                 color = COLORS[motion.source]
                 cell = axes[row, column]
-                draw_strip(
-                    cell, get_robot(name), motion, near=(color, color), ink=INK
-                )
-                cell.set_ylim(-0.03, 0.48)
+                draw_strip(cell, get_robot(name), motion, near=(color, color), ink=INK)
+                cell.set_ylim(-0.03, 0.43)
                 if column == 0:
                     cell.text(
                         -0.01,
@@ -73,9 +73,7 @@ def learning_picture(curves: Mapping[str, Figures]) -> str:
             steps = np.array(figures.numbers("learning", "steps"), float) / 1e6
             by_source: dict[str, list[np.ndarray]] = {}
             for label in figures.part("learning", "return").values:
-                values = np.array(
-                    figures.numbers("learning", "return", label), float
-                )
+                values = np.array(figures.numbers("learning", "return", label), float)
                 source = label.split("-")[0]
                 by_source.setdefault(source, []).append(values)
                 cell.plot(steps, values, color=COLORS[source], lw=0.8, alpha=0.35)
@@ -130,19 +128,29 @@ def returns_picture(tracking: Mapping[str, Figures], aims: tuple[float, float]) 
                 worst = part.number("normalized_return_worst")
                 if worst is not None:
                     axes.plot([at], [worst], "_", color=INK, ms=9, mew=2)
-                axes.text(at, value + 1, f"{value:.0f}", ha="center", size=8)
+                high = value > _TALL
+                axes.text(
+                    at,
+                    2 if high else value + 1,
+                    f"{value:.0f}",
+                    ha="center",
+                    size=8,
+                    color="white" if high else INK,
+                )
             name = robot_title(robot)
             axes.bar([np.nan], [np.nan], color=ROBOT_COLORS[robot], label=name)
         axes.plot([], [], "_", color=INK, ms=9, mew=2, label="worst episode")
         mean, worst_gait = aims
         for aim, what in ((mean, "aim, mean"), (worst_gait, "aim, worst gait")):
-            axes.axhline(aim, color=FAINT, ls="--", lw=1)
-            axes.text(len(labels) - 0.45, aim, what, va="center", color=FAINT, size=8)
+            axes.axhline(aim, color=FAINT, ls="--", lw=1, zorder=0)
+            axes.text(len(labels) - 0.45, aim, what, va="bottom", color=FAINT, size=8)
         axes.set_xticks(range(len(labels)), labels, rotation=35, ha="right")
         axes.set(ylim=(0, 105), xlim=(-0.6, len(labels) + 0.9))
         axes.set_ylabel("normalized return, of 100")
         figure.legend(loc="outside upper right", ncols=3)
-        return to_svg(figure, "Normalized return of each gait; the table has the values.")
+        return to_svg(
+            figure, "Normalized return of each gait; the table has the values."
+        )
 
 
 def confusion_picture(figures: Figures, kind: str) -> str:
@@ -159,7 +167,7 @@ def confusion_picture(figures: Figures, kind: str) -> str:
     )
     labels = [str(x) for x in figures.part("confusion").values.get("labels", [])]
     with page_style(f"confusion-{kind}-{figures.values.get('robot')}"):
-        figure = Figure(figsize=(11, 4.3), layout="constrained")
+        figure = Figure(figsize=(11, 4.7), layout="constrained")
         axes = figure.subplots(1, len(matrices))
         within = figures.part("confusion", kind)
         for place, (cell, (key, title)) in enumerate(zip(axes, matrices, strict=True)):
@@ -168,9 +176,7 @@ def confusion_picture(figures: Figures, kind: str) -> str:
                 color = "#1f9d6b" if row == column else "#d9340d"
                 if share >= 0.005:
                     alpha = 0.25 + 0.75 * share
-                    cell.bar(
-                        column, 0.92, 0.92, row - 0.46, color=color, alpha=alpha
-                    )
+                    cell.bar(column, 0.92, 0.92, row - 0.46, color=color, alpha=alpha)
                     text = f"{100 * share:.0f}"
                     cell.text(column, row, text, ha="center", va="center", size=6)
             cell.set_title(title)

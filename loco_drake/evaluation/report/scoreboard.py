@@ -60,7 +60,7 @@ def _score(goal: Goal, measured: Measured | None) -> Score:
     notes = []
     if measured.low is not None and measured.high is not None:
         low, high = (number(x, goal.digits) for x in (measured.low, measured.high))
-        notes.append(f"{low} to {high}")
+        notes.append(f"{low}–{high}")
     if measured.price:
         notes.append(measured.price)
     return Score(Cell(number(measured.value, goal.digits), "; ".join(notes)), verdict)

@@ -1,10 +1,14 @@
 """The tables of each part of the pipeline, for all robots that have results."""
 
+from collections.abc import Iterable
+
 from loco_drake.evaluation.report.expected import CONDITIONS
 from loco_drake.evaluation.report.measures import read_estimate
+from loco_drake.evaluation.report.published import CLIPS
 from loco_drake.evaluation.report.results import Figures, Results
 from loco_drake.evaluation.report.table_one import estimate_cell
 from loco_drake.evaluation.report.tables import (
+    NOT_PUBLISHED,
     NOTHING,
     Cell,
     Column,
@@ -20,6 +24,7 @@ from loco_drake.models.robots import ROBOTS
 _RETARGETING = (
     Column("slip, mm/s", "stance_slip_median_mps", 1000, 2),
     Column("correction, mm RMS", "correction_rmse_m", 1000, 1),
+    Column("trunk moved, mm RMS", "trunk_correction_rmse_m", 1000, 1),
     Column("toe error, mm RMS", "toe_error_rmse_m", 1000, 2),
     Column("sunk, mm", "penetration_max_m", 1000, 2),
     Column("beyond limits", "joint_limit_violations", 1, 0),
@@ -41,6 +46,14 @@ _GENERATION = (
     Column("recorded, m/s", "speed_mps", 1, 2, within=("recorded",)),
     Column("error of mean speed, m/s", "speed_error_mps", 1, 3),
 )
+_PARTS = "two_sample_accuracy_of_parts"
+_REALISM = {
+    "fid": ("Fréchet distance, generated to recorded", 3),
+    "fid_real_real": ("… of recordings to other recordings", 3),
+    "nearest_training_rad": ("nearest recording, rad RMS", 3),
+    "nearest_training_rad_validation": ("… of recordings held out", 3),
+    "real_time_factor": ("writing, × real time", 1),
+}
 _TRACKING = (
     Column("return, of 100", "normalized_return", 1, 1),
     Column("stretch", "stretch", 1, 3),
@@ -138,45 +151,27 @@ def _drift(figures: Figures, row: Row) -> Cell:
 def realism_table(results: Results) -> Table:
     """Returns what tells generated motion from recordings, robots side by side."""
     robots = of_robots(results, "generation")
-    titles = {
-        "two_sample_accuracy": "told from recordings, linear (.5 is chance)",
-        "two_sample_accuracy_kernel": "… by a support vector machine",
-        "two_sample_accuracy_real_real": "recordings told from other recordings",
-    }
-    rows = [
-        Row(title, tuple(_estimate(figures, (key,)) for figures in robots.values()))
-        for key, title in titles.items()
-    ]
+    rows = []
+
+    def add(title: str, key: str, cells: Iterable[Cell]) -> None:
+        theirs = Cell(f"{CLIPS[key]:.3f}" if key in CLIPS else NOT_PUBLISHED)
+        rows.append(Row(title, (theirs, *cells)))
+
+    def add_estimate(title: str, *keys: str) -> None:
+        add(title, keys[-1], (_estimate(figures, keys) for figures in robots.values()))
+
+    add_estimate("told from recordings, linear (.5 is chance)", "two_sample_accuracy")
     parts = dict.fromkeys(
-        part
-        for figures in robots.values()
-        for part in figures.values.get("two_sample_accuracy_of_parts") or {}
+        part for figures in robots.values() for part in figures.values.get(_PARTS) or {}
     )
-    rows += [
-        Row(
-            f"… linear, from {part} alone",
-            tuple(
-                _estimate(figures, ("two_sample_accuracy_of_parts", part))
-                for figures in robots.values()
-            ),
-        )
-        for part in parts
-    ]
-    numbers = {
-        "fid": ("Fréchet distance, generated to recorded", 3),
-        "fid_real_real": ("… of recordings to other recordings", 3),
-        "nearest_training_rad": ("nearest recording, rad RMS", 3),
-        "nearest_training_rad_validation": ("… of recordings held out", 3),
-        "real_time_factor": ("writing, × real time", 1),
-    }
-    rows += [
-        Row(
-            title,
-            tuple(Column("", key, 1, n).cell(figures) for figures in robots.values()),
-        )
-        for key, (title, n) in numbers.items()
-    ]
-    columns = tuple(map(robot_title, robots))
+    for part in parts:
+        add_estimate(f"… from {part} alone", _PARTS, part)
+    add_estimate("… by a support vector machine", "two_sample_accuracy_kernel")
+    add_estimate("recordings told from others, linear", "two_sample_accuracy_real_real")
+    for key, (title, digits) in _REALISM.items():
+        column = Column("", key, 1, digits)
+        add(title, key, (column.cell(figures) for figures in robots.values()))
+    columns = ("paper's clips", *map(robot_title, robots))
     return Table("Real or generated? New or copied?", "figure", columns, tuple(rows))
 
 

@@ -4,6 +4,7 @@ import io
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
@@ -29,7 +30,7 @@ def page_style(name: str) -> Iterator[None]:
     Args:
         name: of the picture; keeps the ids in its SVG apart from those of others.
     """
-    style = {
+    style: dict[str, Any] = {
         "axes.edgecolor": FAINT,
         "axes.labelcolor": INK,
         "axes.spines.right": False,
@@ -51,7 +52,7 @@ def page_style(name: str) -> Iterator[None]:
         "ytick.color": FAINT,
         "ytick.labelcolor": INK,
     }
-    with mpl.rc_context(style):
+    with mpl.rc_context(style):  # type: ignore[arg-type, unused-ignore]
         yield
 
 

@@ -9,7 +9,7 @@ from loco_drake.evaluation.report.published import (
     table_1,
 )
 from loco_drake.evaluation.report.results import Figures
-from loco_drake.evaluation.report.tables import NOTHING, Cell, Row, Table
+from loco_drake.evaluation.report.tables import NOT_PUBLISHED, NOTHING, Cell, Row, Table
 from loco_drake.evaluation.report.words import robot_title
 
 _MATCHED = "generated_to_real_matched"
@@ -21,7 +21,7 @@ def estimate_cell(found: Measured | None, reason: str = "") -> Cell:
         return Cell(NOTHING, reason=reason)
     if found.low is None or found.high is None:
         return Cell(f"{found.value:.3f}")
-    return Cell(f"{found.value:.3f}", note=f"{found.low:.3f} to {found.high:.3f}")
+    return Cell(f"{found.value:.3f}", note=f"{found.low:.3f}–{found.high:.3f}")
 
 
 def transformer_table(generation: dict[str, Figures]) -> Table:
@@ -35,9 +35,7 @@ def transformer_table(generation: dict[str, Figures]) -> Table:
         cells = []
         for comparison in COMPARISONS:
             theirs = table_1(source, comparison)
-            cells.append(
-                estimate_cell(Measured(theirs.mean, theirs.low, theirs.high))
-            )
+            cells.append(estimate_cell(Measured(theirs.mean, theirs.low, theirs.high)))
             cells += [
                 _ours(figures, "transformer", comparison, source)
                 for figures in generation.values()
@@ -48,6 +46,7 @@ def transformer_table(generation: dict[str, Figures]) -> Table:
         "source",
         _columns(generation, "paper"),
         tuple(rows),
+        groups=tuple(COMPARISONS.values()),
     )
 
 
@@ -58,7 +57,7 @@ def linear_table(generation: dict[str, Figures]) -> Table:
         cells = []
         for comparison in COMPARISONS:
             known = source == "all"
-            cells.append(Cell(f"{LINEAR[comparison]:.3f}" if known else NOTHING))
+            cells.append(Cell(f"{LINEAR[comparison]:.3f}" if known else NOT_PUBLISHED))
             cells += [
                 _ours(figures, "linear", comparison, source)
                 for figures in generation.values()
@@ -69,6 +68,7 @@ def linear_table(generation: dict[str, Figures]) -> Table:
         "source",
         _columns(generation, "paper's clips"),
         tuple(rows),
+        groups=tuple(COMPARISONS.values()),
     )
 
 
@@ -78,8 +78,7 @@ def matched_table(generation: dict[str, Figures]) -> Table:
         Row(
             kind,
             tuple(
-                _ours(figures, kind, _MATCHED, "all")
-                for figures in generation.values()
+                _ours(figures, kind, _MATCHED, "all") for figures in generation.values()
             ),
         )
         for kind in ("transformer", "linear")
@@ -93,11 +92,7 @@ def matched_table(generation: dict[str, Figures]) -> Table:
 
 
 def _columns(generation: dict[str, Figures], theirs: str) -> tuple[str, ...]:
-    columns = []
-    for title in COMPARISONS.values():
-        columns += [f"{title}: {theirs}"]
-        columns += [f"{title}: {robot_title(name)}" for name in generation]
-    return tuple(columns)
+    return (theirs, *map(robot_title, generation)) * len(COMPARISONS)
 
 
 def _ours(figures: Figures, kind: str, comparison: str, source: str) -> Cell:

@@ -7,6 +7,7 @@ from loco_drake.evaluation.report.results import Figures
 from loco_drake.gaits import LABELS
 
 NOTHING = "–"
+NOT_PUBLISHED = "not published"
 
 
 @dataclass(frozen=True)
@@ -35,13 +36,23 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table with a title, and units in its columns."""
+    """A table.
+
+    Attributes:
+        title: over it.
+        first: title of the rows' titles.
+        columns: titles, with units.
+        rows: the entries.
+        note: below it.
+        groups: titles over as many columns each, if any.
+    """
 
     title: str
     first: str
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
     note: str = ""
+    groups: tuple[str, ...] = ()
 
     @property
     def reasons(self) -> list[str]:
@@ -86,9 +97,11 @@ class Column:
 
 
 def number(value: float, digits: int) -> str:
-    """Returns a number as text; what is too small to show is a plain 0."""
+    """Returns a number as text; of what is too small to show, a bound."""
     text = f"{value:.{digits}f}"
-    if float(text) == 0:
+    if value and float(text) == 0:
+        return f"< {10.0**-digits:.{digits}f}"
+    if value == 0:
         return "0"
     if abs(value) >= 1e4:
         return f"{value:,.{digits}f}"
@@ -113,9 +126,7 @@ def label_table(
         for label in known
     ]
     whole = figures.part("all")
-    rows.append(
-        Row("all", tuple(column.cell(whole) for column in columns), total=True)
-    )
+    rows.append(Row("all", tuple(column.cell(whole) for column in columns), total=True))
     return Table(title, "gait", tuple(c.title for c in columns), tuple(rows), note)
 
 
