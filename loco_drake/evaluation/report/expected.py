@@ -52,6 +52,16 @@ CONDITIONS = {
         "another contact solver, at a tenth of the step",
         "--contact lagged --time-step 0.001 --seeds 2 --duration 4",
     ),
+    "randomized": (
+        "randomized worlds",
+        "friction, masses, motors, delays and sensors drawn anew for each episode",
+        "--randomize --seeds 10",
+    ),
+    "pushes": (
+        "pushes",
+        "the robot is pushed from random sides, by .5 m/s every 2 s",
+        "--pushes --seeds 10",
+    ),
 }
 
 EXPECTED = (
