@@ -31,8 +31,8 @@ def learning_curve(log: Path, points: int = POINTS) -> dict[str, Any]:
         if earlier is not None and line["seconds"] < earlier["seconds"]:
             before += earlier["seconds"]
         seconds.append(before + line["seconds"])
-    kept = np.unique(np.linspace(0, len(lines) - 1, points).round().astype(int))
-    kept = kept[kept >= 0]
+    ends = np.linspace(0, len(lines) - 1, points if lines else 0)
+    kept = np.unique(ends.round().astype(int))
     labels = {
         name.removeprefix(_PREFIX): None
         for line in lines

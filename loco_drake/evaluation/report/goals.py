@@ -4,6 +4,8 @@ from math import degrees, inf
 
 from loco_drake.evaluation.report.goal import Goal
 from loco_drake.evaluation.report.measures import (
+    LEAST_RETURN,
+    LEAST_WORST_RETURN,
     estimate,
     plain,
     retargeted_slip,
@@ -195,7 +197,7 @@ GOALS = (
         "“close to 100”, with joint errors over π; 98.5 (DeepMimic, walk)",
         "≥ 90",
         tracking("normalized_return"),
-        low=90.0,
+        low=LEAST_RETURN,
         dream=("≥ 95", 95.0, inf),
         digits=1,
     ),
@@ -206,7 +208,7 @@ GOALS = (
         "not published",
         "≥ 80",
         worst_gait,
-        low=80.0,
+        low=LEAST_WORST_RETURN,
         dream=("≥ 90", 90.0, inf),
         digits=1,
     ),
@@ -223,7 +225,7 @@ GOALS = (
     ),
     Goal(
         _TRACKING,
-        "joint error",
+        "joint error of the robot",
         "° RMS",
         "3.4 (Uni-Mo)",
         "≤ 2.4",

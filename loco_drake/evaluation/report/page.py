@@ -8,17 +8,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from loco_drake import __version__
 from loco_drake.evaluation.report import pictures, sections, table_one
 from loco_drake.evaluation.report.expected import CONDITIONS, EXPECTED
-from loco_drake.evaluation.report.measures import LEAST_RETURN
 from loco_drake.evaluation.report.networks import networks_table
-from loco_drake.evaluation.report.published import COMPARISONS
 from loco_drake.evaluation.report.replays import Replay, share_pieces
 from loco_drake.evaluation.report.results import Results
 from loco_drake.evaluation.report.scoreboard import Line
 from loco_drake.evaluation.report.words import robot_title
 from loco_drake.models.robots import ROBOTS
 from loco_drake.motion import Motion
-
-LEAST_WORST_RETURN = 80.0  # of 100, the aim for the worst gait
 
 
 def render(
@@ -67,33 +63,51 @@ def render(
         replays=replays,
         replay_data=share_pieces([replay.html for replay in replays]),
         unavailable=unavailable,
-        **_measured(results),
+        **tables(results),
+        **drawings(results),
     )
 
 
-def _measured(results: Results) -> dict[str, Any]:
-    """Returns tables and pictures of what results there are; None of others."""
+def tables(results: Results) -> dict[str, Any]:
+    """Returns the tables of what results there are, by name; None of others.
+
+    Raises:
+        InputError: if a result is damaged.
+    """
     generation = sections.of_robots(results, "generation")
-    tracking = sections.of_robots(results, "tracking-generated")
-    learning = sections.of_robots(results, "learning")
-    aims = (LEAST_RETURN, LEAST_WORST_RETURN)
     robustness = sections.robustness_table(results)
     return {
         "retargeting": sections.retargeting_tables(results),
         "tokenizer": sections.tokenizer_tables(results),
         "generation": sections.generation_tables(results),
-        "comparisons": COMPARISONS,
         "transformer": table_one.transformer_table(generation) if generation else None,
         "linear": table_one.linear_table(generation) if generation else None,
         "matched": table_one.matched_table(generation) if generation else None,
         "realism": sections.realism_table(results) if generation else None,
+        "tracking": sections.tracking_tables(results),
+        "robustness": robustness if robustness.rows else None,
+    }
+
+
+def drawings(results: Results) -> dict[str, Any]:
+    """Returns the pictures of what results there are, by name; None of others.
+
+    Raises:
+        InputError: if a result is damaged.
+    """
+    generation = sections.of_robots(results, "generation")
+    tracking = sections.of_robots(results, "tracking-generated")
+    learning = {
+        robot: figures
+        for robot, figures in sections.of_robots(results, "learning").items()
+        if figures.numbers("learning", "steps")
+    }
+    return {
         "confusions": {
             robot: pictures.confusion_picture(figures, "transformer")
             for robot, figures in generation.items()
-            if isinstance(figures.values.get("confusion"), dict)
+            if figures.values.get("confusion") is not None
         },
-        "tracking": sections.tracking_tables(results),
-        "returns": pictures.returns_picture(tracking, aims) if tracking else None,
-        "robustness": robustness if robustness.rows else None,
+        "returns": pictures.returns_picture(tracking) if tracking else None,
         "learning": pictures.learning_picture(learning) if learning else None,
     }

@@ -4,8 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from loco_drake.evaluation.generation_pictures import draw_strip
+from loco_drake.evaluation.report.measures import LEAST_RETURN, LEAST_WORST_RETURN
 from loco_drake.evaluation.report.results import Figures
 from loco_drake.evaluation.report.svg import (
     COLORS,
@@ -19,6 +21,8 @@ from loco_drake.evaluation.report.words import robot_title
 from loco_drake.gaits import LABELS, SOURCES
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import Motion
+
+Array = NDArray[np.float64]
 
 _TALL = 15.0  # of 100: bars that a number fits into
 
@@ -70,17 +74,11 @@ def learning_picture(curves: Mapping[str, Figures]) -> str:
         axes = figure.subplots(1, len(curves), squeeze=False, sharey=True)[0]
         ends = []
         for cell, (robot, figures) in zip(axes, curves.items(), strict=True):
-            steps = np.array(figures.numbers("learning", "steps"), float) / 1e6
-            by_source: dict[str, list[np.ndarray]] = {}
-            for label in figures.part("learning", "return").values:
-                values = np.array(figures.numbers("learning", "return", label), float)
-                source = label.split("-")[0]
-                by_source.setdefault(source, []).append(values)
-                cell.plot(steps, values, color=COLORS[source], lw=0.8, alpha=0.35)
-            for source in SOURCES:
-                if source not in by_source:
-                    continue
-                mean = _mean(np.array(by_source[source]))
+            steps, by_source = _curves(figures)
+            for source, returns in by_source.items():
+                for values in returns:
+                    cell.plot(steps, values, color=COLORS[source], lw=0.8, alpha=0.35)
+                mean = _mean(returns)
                 cell.plot(steps, mean, color=COLORS[source], lw=2.2, label=source)
                 ends.append(f"{robot} {source} {mean[-1]:.0f}")
             cell.axhline(100, color=FAINT, ls="--", lw=1)
@@ -97,19 +95,31 @@ def learning_picture(curves: Mapping[str, Figures]) -> str:
         return to_svg(figure, alt)
 
 
-def _mean(values: np.ndarray) -> np.ndarray:
+def _curves(figures: Figures) -> tuple[Array, dict[str, Array]]:
+    """Returns steps in millions, (N,), and returns by source, (labels, N)."""
+    steps = np.array(figures.numbers("learning", "steps"), float) / 1e6
+    by_source: dict[str, list[Array]] = {source: [] for source in SOURCES}
+    for label in figures.part("learning", "return").values:
+        values = np.array(figures.numbers("learning", "return", label), float)
+        source = label.split("-")[0]
+        if source not in by_source or len(values) != len(steps):
+            raise figures.damaged(f"learning.return.{label} is no curve of a gait")
+        by_source[source].append(values)
+    return steps, {name: np.array(found) for name, found in by_source.items() if found}
+
+
+def _mean(values: Array) -> Array:
     """Returns the mean over labels (axis 0) of those already trained on."""
     known = ~np.isnan(values)
     total = np.where(known, values, 0).sum(axis=0)
     return np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
 
 
-def returns_picture(tracking: Mapping[str, Figures], aims: tuple[float, float]) -> str:
+def returns_picture(tracking: Mapping[str, Figures]) -> str:
     """Returns the return of each gait, robot beside robot.
 
     Args:
         tracking: figures of each robot.
-        aims: for the mean of all gaits and for the worst.
     """
     labels = [str(label) for label in LABELS]
     with page_style("returns"):
@@ -140,8 +150,10 @@ def returns_picture(tracking: Mapping[str, Figures], aims: tuple[float, float]) 
             name = robot_title(robot)
             axes.bar([np.nan], [np.nan], color=ROBOT_COLORS[robot], label=name)
         axes.plot([], [], "_", color=INK, ms=9, mew=2, label="worst episode")
-        mean, worst_gait = aims
-        for aim, what in ((mean, "aim, mean"), (worst_gait, "aim, worst gait")):
+        for aim, what in (
+            (LEAST_RETURN, "aim, mean"),
+            (LEAST_WORST_RETURN, "aim, worst gait"),
+        ):
             axes.axhline(aim, color=FAINT, ls="--", lw=1, zorder=0)
             axes.text(len(labels) - 0.45, aim, what, va="bottom", color=FAINT, size=8)
         axes.set_xticks(range(len(labels)), labels, rotation=35, ha="right")
@@ -165,13 +177,13 @@ def confusion_picture(figures: Figures, kind: str) -> str:
         ("real_to_generated", "generated, by recorded"),
         ("generated_to_real", "recorded, by generated"),
     )
-    labels = [str(x) for x in figures.part("confusion").values.get("labels", [])]
+    labels = figures.part("confusion").strings("labels")
     with page_style(f"confusion-{kind}-{figures.values.get('robot')}"):
         figure = Figure(figsize=(11, 4.7), layout="constrained")
         axes = figure.subplots(1, len(matrices))
         within = figures.part("confusion", kind)
         for place, (cell, (key, title)) in enumerate(zip(axes, matrices, strict=True)):
-            matrix = np.array(within.values.get(key), float)
+            matrix = within.matrix(key, len(labels))
             for (row, column), share in np.ndenumerate(matrix):
                 color = "#1f9d6b" if row == column else "#d9340d"
                 if share >= 0.005:

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from loco_drake.errors import InputError
 from loco_drake.evaluation.report.expected import EXPECTED, ResultFile
 from loco_drake.models.robots import ROBOTS
@@ -40,7 +43,7 @@ class Figures:
         for key in keys:
             value = value.get(key) if isinstance(value, dict) else None
         if not isinstance(value, dict):
-            raise self._damaged(f"it has no {'.'.join(keys)}")
+            raise self.damaged(f"it has no {'.'.join(keys)}")
         return Figures(value, self.origin)
 
     def parts(self, *keys: str) -> Iterator[tuple[str, "Figures"]]:
@@ -59,9 +62,9 @@ class Figures:
         if value is None:
             return None
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self._damaged(f"{key} is {value!r}, not a number")
+            raise self.damaged(f"{key} is {value!r}, not a number")
         if not math.isfinite(value):
-            raise self._damaged(f"{key} is {value}")
+            raise self.damaged(f"{key} is {value}")
         return float(value)
 
     def required(self, key: str) -> float | None:
@@ -71,7 +74,7 @@ class Figures:
             InputError: if it is not there, or not a finite number.
         """
         if key not in self.values:
-            raise self._damaged(f"it has no {key}")
+            raise self.damaged(f"it has no {key}")
         return self.number(key)
 
     def numbers(self, *keys: str) -> list[float | None]:
@@ -79,9 +82,26 @@ class Figures:
         within, last = self.part(*keys[:-1]), keys[-1]
         values = within.values.get(last)
         if not isinstance(values, list):
-            raise self._damaged(f"{'.'.join(keys)} is no list")
+            raise self.damaged(f"{'.'.join(keys)} is no list")
         named = Figures({str(i): v for i, v in enumerate(values)}, self.origin)
         return [named.number(str(i)) for i in range(len(values))]
+
+    def strings(self, key: str) -> list[str]:
+        """Returns the list of strings that is called ``key``."""
+        values = self.values.get(key)
+        if not isinstance(values, list) or not all(isinstance(v, str) for v in values):
+            raise self.damaged(f"{key} is no list of strings")
+        return values
+
+    def matrix(self, key: str, size: int) -> NDArray[np.float64]:
+        """Returns the square matrix that is called ``key``, shape (size, size)."""
+        try:
+            values = np.array(self.values.get(key), float)
+        except (TypeError, ValueError):
+            values = np.empty(0)
+        if values.shape != (size, size) or not np.isfinite(values).all():
+            raise self.damaged(f"{key} is no matrix of {size} rows and columns")
+        return values
 
     def reason(self, key: str) -> str | None:
         """Returns why ``key`` is null, if that is said."""
@@ -90,7 +110,8 @@ class Figures:
             reason = reason.get(key)
         return str(reason) if reason else None
 
-    def _damaged(self, why: str) -> InputError:
+    def damaged(self, why: str) -> InputError:
+        """Returns the error that says what is wrong with the file."""
         return InputError(f"{self.origin} is damaged: {why}; write it again.")
 
 
