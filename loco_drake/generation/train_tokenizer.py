@@ -37,6 +37,7 @@ WEIGHTS = {
     "features": 1.0,  # squared error, see Scales
     "changes": 0.25,  # ... of the change from frame to frame
     "jitter": 0.1,  # ... of the change of that
+    "energy": 1.0,  # squared error of the logarithm of the RMS of that in a window
     "toes": 1.0,  # squared error of toe positions, in units of TOE_SCALE
     "toe_speeds": 0.5,  # ... of their velocities over the ground, TOE_SPEED_SCALE
     "contacts": 0.2,  # cross-entropy
@@ -44,6 +45,7 @@ WEIGHTS = {
 }
 LEAST_SHARE = 0.1  # of a label's scale in that of all
 LEAST_SCALES = (0.02, 0.005, 0.002)  # of deviation, change, jitter: rad, stand heights
+QUIET = 0.2  # share of a label's jitter that is taken for none
 TOE_SCALE = 0.05  # m
 TOE_SPEED_SCALE = 0.5  # m/s
 
@@ -209,6 +211,7 @@ def tokenizer_losses(
         "features": (error / deviation).square().mean(),
         "changes": (error.diff(dim=1) / change).square().mean(),
         "jitter": (error.diff(n=2, dim=1) / jitter).square().mean(),
+        "energy": energy_error(output, target, jitter),
         "toes": ((p_output - p_target) / TOE_SCALE).square().mean(),
         "toe_speeds": ((v_output - v_target) / TOE_SPEED_SCALE).square().mean(),
         "contacts": functional.binary_cross_entropy_with_logits(
@@ -216,3 +219,22 @@ def tokenizer_losses(
         ),
         "commitment": commitment,
     }
+
+
+def energy_error(output: Tensor, target: Tensor, jitter: Tensor) -> Tensor:
+    """Returns by how much windows tremble too little or too much.
+
+    What a token cannot tell of a tremor is its phase. The least squared error is then
+    no tremor at all; here it must be there, in any phase.
+
+    Args:
+        output: features, shape (N, T, SIZE).
+        target: the same.
+        jitter: what is much, see :class:`Scales`.
+    """
+
+    def energy(features: Tensor) -> Tensor:
+        turn = features[..., : CONTACTS.start].diff(n=2, dim=1) / jitter
+        return torch.log(turn.square().mean(dim=1) + QUIET**2) / 2
+
+    return (energy(output) - energy(target)).square().mean()

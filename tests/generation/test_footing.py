@@ -46,6 +46,17 @@ def test_feet_of_a_motion_that_slips_stand(make_synthetic):
     assert abs(mended - true) < 0.8 * abs(raw - true)
 
 
+def test_the_base_is_drawn_to_its_feet_without_a_jolt(make_synthetic):
+    """Its correction changes by at most .15 (.05 * 60 mm + itself) a frame."""
+    features = ft.motion_features(GO2, make_synthetic("dog-trot", 4.0, 0.8))[None]
+    features[..., 0] *= 1.15
+    plain = ft.positions(GO2, features, ft.integrate_path(GO2, features, ORIGIN))
+    _, q, _ = step_footing(GO2, start_footing(ORIGIN), features)
+    correction = np.diff((q - plain)[0, :, 4:6], axis=0)
+    assert np.abs(correction).max() > 5e-4
+    assert np.abs(np.diff(correction, axis=0)).max() < 2 * 0.15 * 0.05 * 0.06
+
+
 def test_no_toe_is_below_the_ground(make_synthetic):
     features = ft.motion_features(GO2, make_synthetic("dog-pace", 2.0, 0.8))[None]
     features[..., ft.HEIGHT] -= 0.03 / GO2.stand_height
