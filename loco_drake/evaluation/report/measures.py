@@ -63,7 +63,7 @@ def retargeted_slip(results: Results, robot: str) -> Measured | None:
     moved = whole.required("correction_rmse_m")
     if slip is None or moved is None:
         return None
-    price = f"targets moved {1000 * moved:.1f} mm RMS"
+    price = f"moved {1000 * moved:.1f} mm RMS"
     return Measured(slip, price=price, paid=moved <= MOST_CORRECTION)
 
 

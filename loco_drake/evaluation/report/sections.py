@@ -8,7 +8,7 @@ from loco_drake.evaluation.report.published import CLIPS
 from loco_drake.evaluation.report.results import Figures, Results
 from loco_drake.evaluation.report.table_one import estimate_cell
 from loco_drake.evaluation.report.tables import (
-    NOT_PUBLISHED,
+    NOT_MEASURED,
     NOTHING,
     Cell,
     Column,
@@ -154,7 +154,7 @@ def realism_table(results: Results) -> Table:
     rows = []
 
     def add(title: str, key: str, cells: Iterable[Cell]) -> None:
-        theirs = Cell(f"{CLIPS[key]:.3f}" if key in CLIPS else NOT_PUBLISHED)
+        theirs = Cell(f"{CLIPS[key]:.3f}" if key in CLIPS else NOT_MEASURED)
         rows.append(Row(title, (theirs, *cells)))
 
     def add_estimate(title: str, *keys: str) -> None:

@@ -9,7 +9,7 @@ from loco_drake.evaluation.report.published import (
     table_1,
 )
 from loco_drake.evaluation.report.results import Figures
-from loco_drake.evaluation.report.tables import NOT_PUBLISHED, NOTHING, Cell, Row, Table
+from loco_drake.evaluation.report.tables import NOT_MEASURED, NOTHING, Cell, Row, Table
 from loco_drake.evaluation.report.words import robot_title
 
 _MATCHED = "generated_to_real_matched"
@@ -57,7 +57,7 @@ def linear_table(generation: dict[str, Figures]) -> Table:
         cells = []
         for comparison in COMPARISONS:
             known = source == "all"
-            cells.append(Cell(f"{LINEAR[comparison]:.3f}" if known else NOT_PUBLISHED))
+            cells.append(Cell(f"{LINEAR[comparison]:.3f}" if known else NOT_MEASURED))
             cells += [
                 _ours(figures, "linear", comparison, source)
                 for figures in generation.values()

@@ -7,7 +7,7 @@ from loco_drake.evaluation.report.results import Figures
 from loco_drake.gaits import LABELS
 
 NOTHING = "–"
-NOT_PUBLISHED = "not published"
+NOT_MEASURED = "not measured"  # of what others released
 
 
 @dataclass(frozen=True)
