@@ -102,25 +102,24 @@ def worst_gait(results: Results, robot: str) -> Measured | None:
 
 def training_steps(results: Results, robot: str) -> Measured | None:
     """Millions of steps of training; missed where they did not bring the return."""
-    figures = results.of("learning", robot)
-    if figures is None:
-        return None
-    steps = figures.numbers("learning", "steps")
-    if not steps or steps[-1] is None:
+    steps = _at_the_end(results, robot, "steps")
+    if steps is None:
         return None
     score = tracking("normalized_return")(results, robot)
     if score is None:
-        return Measured(steps[-1] / 1e6, price="return not measured", paid=False)
+        return Measured(steps / 1e6, price="return not measured", paid=False)
     price = f"return {score.value:.1f}"
-    return Measured(steps[-1] / 1e6, price=price, paid=score.value >= LEAST_RETURN)
+    return Measured(steps / 1e6, price=price, paid=score.value >= LEAST_RETURN)
 
 
 def training_hours(results: Results, robot: str) -> Measured | None:
     """Hours of training."""
+    seconds = _at_the_end(results, robot, "seconds")
+    return None if seconds is None else Measured(seconds / 3600)
+
+
+def _at_the_end(results: Results, robot: str, key: str) -> float | None:
+    """Returns the last value of a learning curve."""
     figures = results.of("learning", robot)
-    if figures is None:
-        return None
-    seconds = figures.numbers("learning", "seconds")
-    if not seconds or seconds[-1] is None:
-        return None
-    return Measured(seconds[-1] / 3600)
+    values = [] if figures is None else figures.numbers("learning", key)
+    return values[-1] if values else None

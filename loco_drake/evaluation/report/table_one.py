@@ -1,5 +1,7 @@
 """Table 1 of the paper, theirs beside ours."""
 
+from collections.abc import Callable
+
 from loco_drake.evaluation.report.goal import Measured
 from loco_drake.evaluation.report.measures import read_estimate
 from loco_drake.evaluation.report.published import (
@@ -30,46 +32,24 @@ def transformer_table(generation: dict[str, Figures]) -> Table:
     Args:
         generation: figures of each robot.
     """
-    rows = []
-    for source, title in SOURCES.items():
-        cells = []
-        for comparison in COMPARISONS:
-            theirs = table_1(source, comparison)
-            cells.append(estimate_cell(Measured(theirs.mean, theirs.low, theirs.high)))
-            cells += [
-                _ours(figures, "transformer", comparison, source)
-                for figures in generation.values()
-            ]
-        rows.append(Row(title, tuple(cells), total=source == "all"))
-    return Table(
-        "Transformer, share of trajectories recognized",
-        "source",
-        _columns(generation, "paper"),
-        tuple(rows),
-        groups=tuple(COMPARISONS.values()),
-    )
+
+    def theirs(source: str, comparison: str) -> Cell:
+        entry = table_1(source, comparison)
+        return estimate_cell(Measured(entry.mean, entry.low, entry.high))
+
+    title = "Transformer, share of trajectories recognized"
+    return _table(title, "transformer", generation, "paper", theirs)
 
 
 def linear_table(generation: dict[str, Figures]) -> Table:
     """Returns the same by a linear classifier, with the paper's clips beside ours."""
-    rows = []
-    for source, title in SOURCES.items():
-        cells = []
-        for comparison in COMPARISONS:
-            known = source == "all"
-            cells.append(Cell(f"{LINEAR[comparison]:.3f}" if known else NOT_MEASURED))
-            cells += [
-                _ours(figures, "linear", comparison, source)
-                for figures in generation.values()
-            ]
-        rows.append(Row(title, tuple(cells), total=source == "all"))
-    return Table(
-        "Linear classifier on summaries, share of trajectories recognized",
-        "source",
-        _columns(generation, "paper's clips"),
-        tuple(rows),
-        groups=tuple(COMPARISONS.values()),
-    )
+
+    def theirs(source: str, comparison: str) -> Cell:
+        known = source == "all"
+        return Cell(f"{LINEAR[comparison]:.3f}" if known else NOT_MEASURED)
+
+    title = "Linear classifier on summaries, share of trajectories recognized"
+    return _table(title, "linear", generation, "paper's clips", theirs)
 
 
 def matched_table(generation: dict[str, Figures]) -> Table:
@@ -91,8 +71,30 @@ def matched_table(generation: dict[str, Figures]) -> Table:
     )
 
 
-def _columns(generation: dict[str, Figures], theirs: str) -> tuple[str, ...]:
-    return (theirs, *map(robot_title, generation)) * len(COMPARISONS)
+def _table(
+    title: str,
+    kind: str,
+    generation: dict[str, Figures],
+    whose: str,
+    theirs: Callable[[str, str], Cell],
+) -> Table:
+    rows = []
+    for source, name in SOURCES.items():
+        cells: list[Cell] = []
+        for comparison in COMPARISONS:
+            cells.append(theirs(source, comparison))
+            cells += [
+                _ours(figures, kind, comparison, source)
+                for figures in generation.values()
+            ]
+        rows.append(Row(name, tuple(cells), total=source == "all"))
+    return Table(
+        title,
+        "source",
+        (whose, *map(robot_title, generation)) * len(COMPARISONS),
+        tuple(rows),
+        groups=tuple(COMPARISONS.values()),
+    )
 
 
 def _ours(figures: Figures, kind: str, comparison: str, source: str) -> Cell:
