@@ -60,7 +60,7 @@ class EvaluateTracking:
     """Friction of the ground."""
     pushes: bool = False
     """Push the trunk again and again, in directions drawn by the seed."""
-    push_size: float = 0.5
+    push_size: float = 1.0
     """With --pushes: the velocity that each would give the robot as a whole, m/s; its
     mass times that is the impulse, spread over .1 s."""
     push_interval: float = 2.0

@@ -191,6 +191,6 @@ STANDARD = RandomizationConfig(
     com_shift=(-0.03, 0.03),
     motor_strength=(0.85, 1.15),
     latency=(0.0, 0.02),
-    push=(0.1, 0.5),
+    push=(0.1, 0.8),
     noise=1.0,
 )

@@ -92,7 +92,7 @@ class Standing:
         ]
         depths = [info.point_pair().depth for info in infos]
         points = [info.contact_point() for info in infos]
-        return np.array(forces), np.array(points), np.array(depths)
+        return np.array(forces).reshape(-1, 3), np.array(points), np.array(depths)
 
 
 @pytest.mark.parametrize("contact", CONTACTS)
@@ -100,37 +100,34 @@ def test_sliding_feet_are_held_back_by_coulombs_friction(go2, contact):
     """Ground of .1 under feet of .8: the harmonic mean is 2 (.08) / .9 = .178."""
     robot = Standing(go2, Domain(friction=0.1), PlantConfig(contact=contact))
     robot.advance(0.3)
-    robot.slide(1.0)
-    robot.advance(0.36)
-    forces, _, _ = robot.contacts
-    assert len(forces) >= 2
-    ratio = -forces[:, 0] / forces[:, 2]
-    np.testing.assert_allclose(ratio, 0.16 / 0.9, rtol=0.01)
-    # Its legs give way a little: the trunk goes on for v^2 / (2 mu g), roughly.
-    robot.advance(1.5)
-    stop = 1.0 / (2 * 0.16 / 0.9 * GRAVITY)
-    assert robot.state[4] == pytest.approx(stop, rel=0.1)
+    robot.slide(0.5)
+    impulse = np.zeros(3)
+    for k in range(31, 41):
+        robot.advance(k * 0.01)
+        impulse += robot.contacts[0].sum(axis=0)
+    assert impulse[2] > 0.08 * GO2_MASS * GRAVITY / 0.01
+    assert -impulse[0] / impulse[2] == pytest.approx(0.16 / 0.9, rel=0.03)
 
 
 def test_a_payload_weighs_on_the_feet(go2):
     robot = Standing(go2, Domain(payload=3.0))
-    robot.advance(2.0)
+    robot.advance(4.0)
     total = robot.contacts[0][:, 2].sum()
     assert total == pytest.approx((GO2_MASS + 3.0) * GRAVITY, rel=1e-4)
 
 
 def test_a_shifted_trunk_shifts_the_centre_of_pressure(go2):
-    """By 7.277 kg of 16.085 kg times 3 cm."""
+    """By 7.277 kg of 16.085 kg times 3 cm, as seen from the trunk, which sways."""
 
     def centre(shift):
         robot = Standing(go2, Domain(com_shift=shift))
         robot.advance(2.0)
         forces, points, _ = robot.contacts
-        return forces[:, 2] @ points[:, :2] / forces[:, 2].sum()
+        return forces[:, 2] @ points[:, :2] / forces[:, 2].sum() - robot.state[4:6]
 
     moved = centre(np.array([0.03, -0.02, 0.0])) - centre(np.zeros(3))
     expected = np.array([0.03, -0.02]) * GO2_TRUNK / GO2_MASS
-    np.testing.assert_allclose(moved, expected, rtol=0.05)
+    np.testing.assert_allclose(moved, expected, rtol=0.02)
 
 
 def test_soft_ground_is_a_spring_in_series_with_the_feet(go2):
@@ -151,11 +148,11 @@ def test_a_push_changes_the_momentum_by_force_times_duration(go2, contact):
     plant = PlantConfig(contact=contact)
     robot = Standing(go2, Domain(pushes=pushes), plant, height=FAR_UP)
     robot.advance(0.1)
-    np.testing.assert_allclose(robot.momentum[:2], 0.0, atol=1e-6)
+    np.testing.assert_allclose(robot.momentum[:2], 0.0, atol=0.01)
     robot.advance(0.14)
-    np.testing.assert_allclose(robot.momentum[:2], [1.6, -0.8], atol=1e-3)
+    np.testing.assert_allclose(robot.momentum[:2], [1.6, -0.8], atol=0.01)
     robot.advance(0.3)
-    np.testing.assert_allclose(robot.momentum[:2], [4.0, -1.0], atol=1e-3)
+    np.testing.assert_allclose(robot.momentum[:2], [4.0, -1.0], atol=0.01)
 
 
 @pytest.mark.parametrize("contact", ["similar", "lagged", "sap"])
@@ -181,14 +178,15 @@ def test_a_step_of_the_action_moves_the_joints_that_many_steps_later(
 ):
     plant = PlantConfig(contact=contact, time_step=0.005)
     domain = Domain(latency=steps * plant.time_step)
-    robot = Standing(go2, domain, plant, height=FAR_UP)
-    robot.advance(0.1)
-    rest = robot.state[25:].copy()
-    robot.act(1.0)
+    told, other = (Standing(go2, domain, plant, height=FAR_UP) for _ in range(2))
+    for robot in (told, other):
+        robot.advance(0.1)
+    told.act(1.0)
     moved = []
     for k in range(1, 7):
-        v = robot.advance(0.1 + k * plant.time_step)[25:]
-        moved.append(bool((np.abs(v - rest) > 0.1).any()))
+        time = (20 + k) * plant.time_step
+        change = told.advance(time) - other.advance(time)
+        moved.append(bool(np.abs(change).max() > 0.01))
     assert moved == [k > steps for k in range(1, 7)]
 
 
