@@ -89,6 +89,8 @@ class Actuation(DomainSystem):
         return self._rotors - (1 - strength) * self._surplus
 
     def _remember(self, context: Context, values: DiscreteValues) -> EventStatus:
+        if self._domain(context).latency == 0:
+            return EventStatus.DidNothing()
         past = values.get_mutable_value(int(self._past))
         now = self._desired.Eval(context)[: self._size]
         if np.isnan(past[0]):

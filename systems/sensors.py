@@ -30,6 +30,9 @@ _TOLERANCE = 1e-6  # of a sample; context times are sums of steps
 
 def error_vector(**sizes: float) -> Array:
     """Returns an error (ERROR_SIZE,) whose named parts have these values, others 0."""
+    unknown = sizes.keys() - dict(ERROR_LAYOUT).keys()
+    if unknown:
+        raise TypeError(f"errors have no part {', '.join(sorted(unknown))}")
     return np.concatenate(
         [np.full(size, sizes.get(name, 0.0)) for name, size in ERROR_LAYOUT]
     )

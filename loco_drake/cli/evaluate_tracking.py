@@ -98,8 +98,9 @@ class EvaluateTracking:
         whole = results.get(self.robot, {"robots": results})
         write_json(self.json, whole)
         for name, result in results.items():
+            world = "" if randomization.is_off else ", randomized"
             title = (
-                f"{name}, {self.reference}, {self.contact}: "
+                f"{name}, {self.reference}, {self.contact}{world}: "
                 f"{result['real_time_factor']:.1f} times real time"
             )
             rows = {**result["labels"], "all of these": result["all"]}

@@ -223,7 +223,7 @@ def test_joints_move_as_with_gains_that_much_lower(go2, contact, strength):
 
 
 def _with_scaled_gains(go2, contact, strength):
-    """The states (25, 37) of a robot in the air sent the set-points of the test above."""
+    """States (25, 37) of a robot in the air, sent the set-points of the test above."""
     builder = DiagramBuilder()
     config = MultibodyPlantConfig(
         time_step=0.01,
