@@ -171,6 +171,20 @@ def test_installed_wheel_has_the_command(installed, tmp_path):
     assert printed == f"{__version__}\n0 {file}\n"
 
 
+REPORT = """
+from loco_drake.cli.main import main
+
+raise SystemExit(main(["report", "--replays", "none"]))
+"""
+
+
+def test_installed_wheel_makes_the_report_of_its_own_results(installed, tmp_path):
+    run_python("-c", REPORT, cwd=tmp_path, PYTHONPATH=str(installed))
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Table 1: quality and diversity" in page
+    assert "Outlines of go2 and a1" in page
+
+
 def test_gymnasium_finds_the_environment_of_the_installed_wheel(installed, tmp_path):
     """In a process that has not imported loco_drake."""
     printed = run_python("-c", GYMNASIUM, cwd=tmp_path, PYTHONPATH=str(installed))
