@@ -7,7 +7,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from loco_drake import __version__
 from loco_drake.evaluation.report import pictures, sections, table_one
-from loco_drake.evaluation.report.expected import CONDITIONS, EXPECTED
+from loco_drake.evaluation.report.commands import commands
+from loco_drake.evaluation.report.expected import CONDITIONS
 from loco_drake.evaluation.report.networks import networks_table
 from loco_drake.evaluation.report.replays import Replay, share_pieces
 from loco_drake.evaluation.report.results import Results
@@ -55,7 +56,7 @@ def render(
         missing=results.missing,
         absent=results.absent,
         found=results.found,
-        commands={file.path: file.command for file in EXPECTED},
+        commands=commands(results),
         conditions=CONDITIONS,
         gaits=pictures.gaits_picture(motions),
         gait_count=len(next(iter(motions.values()))),
