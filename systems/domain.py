@@ -88,6 +88,12 @@ class Domain:
     pushes: tuple[Push, ...] = ()
     sensors: SensorErrors | None = None
 
+    def needs(self, name: str) -> bool:
+        """Returns whether it takes the disturbing system of this name."""
+        if name == "actuation":
+            return self.strength is not None or self.latency > 0
+        return bool(self.pushes) if name == "pushes" else self.sensors is not None
+
     def __copy__(self) -> "Domain":
         return self
 
@@ -124,7 +130,13 @@ def SetDomain(diagram: Diagram, context: Context, domain: Domain) -> None:
             that the domain has.
         context: the diagram's.
         domain: the domain.
+
+    Raises:
+        ValueError: if the diagram lacks a system that the domain needs.
     """
+    for name in DISTURBING_SYSTEMS:
+        if domain.needs(name) and not diagram.HasSubsystemNamed(name):
+            raise ValueError(f"this domain needs a diagram with the system {name}")
     plant = diagram.GetSubsystemByName("plant")
     if domain.friction is not None or domain.stiffness is not None:
         scene_graph = diagram.GetSubsystemByName("scene_graph")

@@ -11,11 +11,12 @@ from pydrake.systems.framework import DiagramBuilder
 from loco_drake.models.plant import CONTACTS, ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import AddRobotModel
 from loco_drake.systems.diagram import MakeLocomotionDiagram
-from loco_drake.systems.domain import Domain, Push, SetDomain
+from loco_drake.systems.domain import Domain, Push, SensorErrors, SetDomain
 from loco_drake.systems.plan import PLAN_DT
 from loco_drake.systems.scenario import (
     Disturbances,
     ExternalAction,
+    LoadScenario,
     PlanReference,
     Scenario,
 )
@@ -278,6 +279,31 @@ def test_a_domain_like_the_model_changes_nothing(go2):
             plain.GetOutputPort(name).Eval(context),
             robot.diagram.GetOutputPort(name).Eval(robot.context),
         )
+
+
+@pytest.mark.parametrize(
+    ("name", "domain"),
+    [
+        ("actuation", Domain(latency=0.02)),
+        ("actuation", Domain(strength=np.ones(12))),
+        ("pushes", Domain(pushes=(Push(start=0, duration=1, force_W=np.ones(3)),))),
+        (
+            "sensors",
+            Domain(sensors=SensorErrors(bias=np.ones(36), white=np.ones(36), seed=0)),
+        ),
+    ],
+)
+def test_a_diagram_without_the_system_is_refused(name, domain):
+    text = "disturbances: {actuation: true, pushes: true, sensors: true}"
+    scenario = LoadScenario(
+        data="{reference: !PlanReference {}, policy: !ExternalAction {}}", overlay=text
+    )
+    diagram = MakeLocomotionDiagram(scenario)
+    SetDomain(diagram, diagram.CreateDefaultContext(), domain)
+    setattr(scenario.disturbances, name, False)
+    lacking = MakeLocomotionDiagram(scenario)
+    with pytest.raises(ValueError, match=f"with the system {name}"):
+        SetDomain(lacking, lacking.CreateDefaultContext(), domain)
 
 
 def test_all_of_it_is_in_the_context(go2):
