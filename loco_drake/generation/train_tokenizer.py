@@ -37,7 +37,7 @@ WEIGHTS = {
     "features": 1.0,  # squared error, see Scales
     "changes": 0.25,  # ... of the change from frame to frame
     "jitter": 0.1,  # ... of the change of that
-    "energy": 1.0,  # squared error of the logarithm of the RMS of that in a window
+    "energy": 0.5,  # squared error of the logarithm of the RMS of that in a window
     "toes": 1.0,  # squared error of toe positions, in units of TOE_SCALE
     "toe_speeds": 0.5,  # ... of their velocities over the ground, TOE_SPEED_SCALE
     "contacts": 0.2,  # cross-entropy
