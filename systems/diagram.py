@@ -14,6 +14,7 @@ from loco_drake.models.robots import Robot, get_robot
 from loco_drake.motion import load_motion
 
 from .actor import load_actor
+from .actuation import Actuation
 from .joint_targets import JointTargets
 from .keypoint_visualizer import KeypointVisualizer
 from .observation import Observation
@@ -21,12 +22,14 @@ from .plan import Plan, plan_from_motion
 from .plan_player import PlanPlayer
 from .plan_state import PlanState
 from .pretrained import policy_path
+from .pushes import Pushes
 from .scenario import (
     ExternalAction,
     GeneratedReference,
     MotionReference,
     Scenario,
 )
+from .sensors import Sensors
 from .toppra_smoother import ToppraSmoother
 from .tracking_policy import TrackingPolicy
 from .tracking_reward import TrackingReward
@@ -55,7 +58,8 @@ def MakeLocomotionDiagram(
         - reward_terms
 
     The subsystems are named plant, scene_graph, reference, smoother, observation,
-    policy, joint_targets, plan_state and reward. Simulate it like this, since a robot
+    policy, joint_targets, plan_state and reward, and, where the scenario's disturbances
+    ask for them, actuation, pushes and sensors. Simulate it like this, since a robot
     must start where its plan starts::
 
         simulator = Simulator(diagram)
@@ -93,13 +97,30 @@ def MakeLocomotionDiagram(
 
     targets = builder.AddNamedSystem("joint_targets", JointTargets(robot))
     builder.Connect(plan, targets.GetInputPort("plan"))
-    builder.Connect(
-        targets.GetOutputPort("desired_state"),
-        plant.get_desired_state_input_port(instance),
-    )
+    desired = targets.GetOutputPort("desired_state")
+    measured = state
+    if scenario.disturbances.actuation:
+        actuation = builder.AddNamedSystem(
+            "actuation", Actuation(robot, scenario.plant)
+        )
+        builder.Connect(desired, actuation.GetInputPort("desired_state"))
+        builder.Connect(state, actuation.GetInputPort("state"))
+        desired = actuation.GetOutputPort("desired_state")
+    if scenario.disturbances.pushes:
+        trunk = plant.GetBodyByName(robot.trunk_frame).index()
+        pushes = builder.AddNamedSystem("pushes", Pushes(trunk))
+        builder.Connect(
+            pushes.GetOutputPort("spatial_forces"),
+            plant.get_applied_spatial_force_input_port(),
+        )
+    if scenario.disturbances.sensors:
+        sensors = builder.AddNamedSystem("sensors", Sensors(robot))
+        builder.Connect(state, sensors.GetInputPort("state"))
+        measured = sensors.GetOutputPort("state")
+    builder.Connect(desired, plant.get_desired_state_input_port(instance))
     observation = builder.AddNamedSystem("observation", Observation(robot))
     builder.Connect(plan, observation.GetInputPort("plan"))
-    builder.Connect(state, observation.GetInputPort("state"))
+    builder.Connect(measured, observation.GetInputPort("state"))
     builder.Connect(targets.GetOutputPort("action"), observation.GetInputPort("action"))
     if isinstance(scenario.policy, ExternalAction):
         builder.ExportInput(targets.GetInputPort("action"), "action")
@@ -124,7 +145,7 @@ def MakeLocomotionDiagram(
     builder.ExportOutput(state, "state")
     builder.ExportOutput(observation.GetOutputPort("observation"), "observation")
     builder.ExportOutput(targets.GetOutputPort("action"), "action")
-    builder.ExportOutput(targets.GetOutputPort("desired_state"), "desired_state")
+    builder.ExportOutput(desired, "desired_state")
     builder.ExportOutput(plant.get_net_actuation_output_port(instance), "net_actuation")
     builder.ExportOutput(reward.GetOutputPort("reward_terms"), "reward_terms")
 

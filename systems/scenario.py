@@ -55,6 +55,22 @@ class ExternalAction:
     """The diagram's input port "action" takes the place of the policy."""
 
 
+# Hashable: batches keep one diagram of each kind.
+@dataclass(kw_only=True, unsafe_hash=True)
+class Disturbances:
+    """Which systems a diagram has for domains unlike the model; see :mod:`.domain`.
+
+    They do nothing until SetDomain tells them what.
+    """
+
+    # Latency and strength of the motors.
+    actuation: bool = False
+    # Forces on the trunk.
+    pushes: bool = False
+    # Errors of what the policy sees of the robot's state.
+    sensors: bool = False
+
+
 @dataclass(kw_only=True)
 class Scenario:
     """Everything that :func:`MakeLocomotionDiagram` needs to know."""
@@ -71,6 +87,8 @@ class Scenario:
     smoother: SmootherConfig | None = field(default_factory=SmootherConfig)
     # What drives the joints.
     policy: TrainedPolicy | ExternalAction = field(default_factory=TrainedPolicy)
+    # What there is between policy and robot beyond the model.
+    disturbances: Disturbances = field(default_factory=Disturbances)
 
 
 def LoadScenario(

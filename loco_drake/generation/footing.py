@@ -131,10 +131,24 @@ def _toes(robot: Robot, features: Array) -> Array:
 
 
 def _move_toes(robot: Robot, q: Array, offset: Array) -> Array:
-    """Returns q with the toes moved by ``offset`` in W, and none below the ground."""
+    """Returns q with the toes moved by ``offset`` in W, and none below the ground.
+
+    Where a leg cannot be folded far enough for that, the base is raised.
+    """
     q_WB, p_WB = q[..., None, :4], q[..., None, 4:7]
     p_WF = quat_rotate(q_WB, toe_positions(robot, q[..., 7:])) + p_WB + offset
     p_WF[..., 2] = np.maximum(p_WF[..., 2], robot.foot_radius)
+    joints, reached = _reach(robot, q_WB, p_WB, p_WF)
+    sunk = np.maximum(robot.foot_radius - reached[..., 2], 0.0).max(axis=-1)
+    raised = q[..., :7].copy()
+    raised[..., 6] += sunk
+    if sunk.any():
+        joints, _ = _reach(robot, q_WB, raised[..., None, 4:], p_WF)
+    return np.concatenate((raised, joints), axis=-1)
+
+
+def _reach(robot: Robot, q_WB: Array, p_WB: Array, p_WF: Array) -> tuple[Array, Array]:
+    """Returns joints within their limits, and where the toes are then."""
     joints = leg_joints(robot, quat_rotate(quat_conjugate(q_WB), p_WF - p_WB))
     joints = np.clip(joints, robot.joint_lower, robot.joint_upper)
-    return np.concatenate((q[..., :7], joints), axis=-1)
+    return joints, quat_rotate(q_WB, toe_positions(robot, joints)) + p_WB

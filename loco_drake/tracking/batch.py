@@ -10,9 +10,16 @@ from pydrake.systems.framework import Diagram
 from loco_drake.models.plant import ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.diagram import MakeLocomotionDiagram
+from loco_drake.systems.domain import Domain, SetDomain
 from loco_drake.systems.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.systems.plan import PLAN_DT, Plan
-from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
+from loco_drake.systems.scenario import (
+    Disturbances,
+    ExternalAction,
+    PlanReference,
+    Scenario,
+)
+from loco_drake.systems.sensors import draw_error, measure
 from loco_drake.systems.tracking_reward import reward_terms
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.terminations import is_lost
@@ -21,7 +28,13 @@ Array = NDArray[np.float64]
 
 
 @lru_cache(maxsize=4)
-def _diagram(robot: str, contact: str, time_step: float, friction: float) -> Diagram:
+def _diagram(
+    robot: str,
+    contact: str,
+    time_step: float,
+    friction: float,
+    disturbances: Disturbances,
+) -> Diagram:
     # One per process: pydrake never frees diagrams with Python systems.
     plant = PlantConfig(contact=contact, time_step=time_step, friction=friction)
     return MakeLocomotionDiagram(
@@ -31,6 +44,7 @@ def _diagram(robot: str, contact: str, time_step: float, friction: float) -> Dia
             reference=PlanReference(),
             smoother=None,
             policy=ExternalAction(),
+            disturbances=disturbances,
         )
     )
 
@@ -39,6 +53,7 @@ class _Robot:
     """One robot: a Context of the diagram, and the simulator that advances it."""
 
     def __init__(self, diagram: Diagram, plant: PlantConfig) -> None:
+        self._diagram = diagram
         self._simulator = Simulator(diagram, diagram.CreateDefaultContext())
         ConfigureSimulator(self._simulator, plant)
         self._context = self._simulator.get_mutable_context()
@@ -46,15 +61,21 @@ class _Robot:
         self._plant_context = self._plant.GetMyMutableContextFromRoot(self._context)
         self._player = diagram.GetSubsystemByName("reference")
         self._player_context = self._player.GetMyMutableContextFromRoot(self._context)
-        self._targets = diagram.GetSubsystemByName("joint_targets")
-        self._targets_context = self._targets.GetMyMutableContextFromRoot(self._context)
+        self._stateful = [
+            (system, system.GetMyMutableContextFromRoot(self._context))
+            for name in ("joint_targets", "actuation")
+            if diagram.HasSubsystemNamed(name)
+            for system in (diagram.GetSubsystemByName(name),)
+        ]
         action = diagram.GetInputPort("action").FixValue(self._context, np.zeros(12))
         self._action = action.GetMutableData()
 
-    def reset(self, plan: Plan, sample: int, state: Array) -> None:
+    def reset(self, plan: Plan, sample: int, state: Array, domain: Domain) -> None:
         """Puts the robot in ``state``, at a sample of the plan that it is to follow."""
         # What is set here is all the state there is.
-        self._targets.SetDefaultContext(self._targets_context)
+        for system, context in self._stateful:
+            system.SetDefaultContext(context)
+        SetDomain(self._diagram, self._context, domain)
         self._context.SetTime(sample * PLAN_DT)
         self._player.SetPlan(self._player_context, plan)
         self._plant.SetPositionsAndVelocities(self._plant_context, state)
@@ -92,7 +113,14 @@ class TrackingBatch:
         self._config = config
         self._robot = get_robot(config.robot)
         plant = config.plant
-        diagram = _diagram(config.robot, plant.contact, plant.time_step, plant.friction)
+        config.randomization.check()
+        diagram = _diagram(
+            config.robot,
+            plant.contact,
+            plant.time_step,
+            plant.friction,
+            config.randomization.disturbances,
+        )
         self._robots = [_Robot(diagram, plant) for _ in range(count)]
         self._lengths = np.array([len(plan) for plan in plans])
         # All samples of all plans, one after the other, for one look-up a step.
@@ -107,6 +135,7 @@ class TrackingBatch:
         self._last = np.zeros(count, dtype=np.int64)
         self._state = np.zeros((count, 37))
         self._action = np.zeros((count, 12))
+        self._domains = [Domain()] * count
 
     def reset(
         self,
@@ -134,7 +163,10 @@ class TrackingBatch:
         self._last[i] = min(sample + steps, length - 1)
         followed = self._plans[plan]
         state = self._config.reset_noise.draw(followed.state[sample], random)
-        self._robots[i].reset(followed, sample, state)
+        self._domains[i] = self._config.randomization.draw(
+            self._robot, random, sample * PLAN_DT, self._last[i] * PLAN_DT
+        )
+        self._robots[i].reset(followed, sample, state, self._domains[i])
         self._state[i], self._action[i] = state, 0.0
 
     def step(
@@ -169,5 +201,14 @@ class TrackingBatch:
             contacts=self._contacts[rows],
             label=self._labels[first + self.sample],
         )
-        observations = observe(self._robot, shown, self._state, self._action)
+        observations = observe(self._robot, shown, self._measured(), self._action)
         return observations.astype(np.float32)
+
+    def _measured(self) -> Array:
+        """Returns the states as the robots measure them, shape (B, 37)."""
+        errors = [
+            draw_error(domain.sensors, int(sample))
+            for domain, sample in zip(self._domains, self.sample, strict=True)
+            if domain.sensors is not None
+        ]
+        return measure(self._state, np.array(errors)) if errors else self._state

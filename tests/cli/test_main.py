@@ -24,6 +24,8 @@ def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("files")
     (folder / "text.npz").write_text("not an archive")
     (folder / "empty").mkdir()
+    (folder / "results").mkdir()
+    (folder / "results" / "tokenizer.json").write_text('{"robots": {"go2": ')
     motion = synthetic_motion(seconds=0.5)
     whole = folder / "motions" / "whole.npz"
     save_motion(motion, whole)
@@ -147,6 +149,13 @@ WRONG = {
     "train classifier --motions FILES/empty": "Motion files",
     "train generator --motions FILES/motions --tokenizer FILES/no": "no tokenizer",
     "train tracker --references FILES/empty": r"no Motion files \(\*.npz\)",
+    "report --results FILES/none": "There is no folder of results .*generation.json",
+    "report --results FILES/empty": "no results in .*one or more of retargeting.json",
+    "report --results FILES/results": "tokenizer.json is damaged: it is no JSON",
+    "report --replays dog-fly": f"Unknown gait 'dog-fly'; the choices are {GAITS}",
+    "report --replays none dog-trot": "none, or gait labels, not both",
+    "report --replay-seconds 0": DURATION,
+    "report --seed -1": "--seed must be 0 or more, not -1",
     "train tracker --references FILES/empty --robot spot": "the choices are go2, a1",
     "train tracker --references FILES/empty --steps 0": "steps must be at least 1",
 }

@@ -97,3 +97,13 @@ def test_joints_stay_within_their_limits(make_synthetic):
     _, q, _ = step_footing(GO2, start_footing(ORIGIN), features)
     assert (q[..., 7:] >= GO2.joint_lower).all()
     assert (q[..., 7:] <= GO2.joint_upper).all()
+
+
+def test_a_leg_that_cannot_fold_raises_the_base(make_synthetic):
+    """At a quarter of the stand height calves are at their limit."""
+    features = ft.motion_features(GO2, make_synthetic("dog-pace", 1.0, 0.0))[None]
+    features[..., ft.HEIGHT] = 0.25
+    _, q, _ = step_footing(GO2, start_footing(ORIGIN), features)
+    assert (q[..., 7:] >= GO2.joint_lower).all()
+    assert (q[..., 6] > 0.3 * GO2.stand_height).all()
+    assert toes_of(q)[..., 2].min() > GO2.foot_radius - 1e-3
