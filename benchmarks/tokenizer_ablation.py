@@ -1,8 +1,8 @@
 """What each choice of the tokenizer is worth: one short training for each variant.
 
 All variants are trained alike, on the same library with the same seed, and scored on
-recordings that were held out. Each leaves a JSON file in ``--out``; those that are
-there already are not trained again, so that the script can be stopped and run anew.
+recordings that were held out. Each leaves a JSON file in ``--out``; what is there
+already is not done again, so that the script can be stopped and run anew.
 Prints the table of docs/generation.md. From the root of the repository, after
 ``loco-drake retarget`` for both robots:
 
@@ -40,7 +40,7 @@ from loco_drake.generation.train_tokenizer import (
     residual_tokenizer,
     train_tokenizer,
 )
-from loco_drake.generation.training import LoopSettings
+from loco_drake.generation.training import CHECKPOINT, LoopSettings
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import FPS, Motion
 
@@ -233,10 +233,19 @@ def main(
         file = out / f"{name.strip('. ').replace(' ', '_')}-{steps}-{seed}.json"
         if not file.exists():
             start = time.perf_counter()
+            folder = out / file.stem
+            settings = LoopSettings(
+                folder,
+                steps,
+                2e-3,
+                seed=seed + variant.seed,
+                resume=(folder / CHECKPOINT).exists(),
+                checkpoint_every=100,
+            )
             tokenizer, result = train_tokenizer(
                 library,
                 replace(TokenizerConfig(robots=library.robots), **variant.config),
-                LoopSettings(out / file.stem, steps, 2e-3, seed=seed + variant.seed),
+                settings,
                 weights={k: w * (k not in variant.off) for k, w in WEIGHTS.items()},
                 build=variant.build,
             )

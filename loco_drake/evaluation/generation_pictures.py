@@ -73,7 +73,7 @@ def code_use_figure(counts: NDArray[np.int64], title: str) -> Figure:
         axes.plot(np.arange(1, len(used) + 1), share, color=color, label=label)
     axes.set(xlabel="code, by use", ylabel="share of the book's use", title=title)
     axes.set_yscale("log")
-    axes.legend()
+    axes.legend(ncols=3, loc="lower left", fontsize="small")
     return figure
 
 

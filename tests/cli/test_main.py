@@ -125,7 +125,7 @@ WRONG = {
     "evaluate tokenizer --labels fly": f"Unknown gait 'fly'; the choices are {GAITS}",
     "evaluate tokenizer --data-dir FILES/none": "There is no data folder",
     "evaluate tokenizer --seeds 0": "--seeds must be 1 or more, not 0",
-    "evaluate tokenizer --data-dir FILES/motions --books 99": "--books must be from 1 to",
+    "evaluate tokenizer --data-dir FILES/motions --books 99": "from 1 to",
     "evaluate generation --robot spot": "'spot'; the choices are go2, a1, all",
     "evaluate generation --labels fly": f"Unknown gait 'fly'; the choices are {GAITS}",
     "evaluate generation --count 0": "--count must be 1 or more, not 0",
