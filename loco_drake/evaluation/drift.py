@@ -19,8 +19,9 @@ the period by itself.
 
 Whether a motion turns or sinks more than those that it was learned from is told by
 :func:`beyond_recorded`: how much the heading changes within 2 s in the last 10 s, root
-mean square, over that of recordings; and how much the height changes from first to last
-10 s, over what 95 % of pairs of recordings of 2 s differ by at most, or 1 mm.
+mean square, over that of recordings, or .04 rad; and how much the height changes from
+first to last 10 s, over what 95 % of pairs of recordings of 2 s differ by at most, or
+1 mm.
 """
 
 from collections.abc import Sequence
@@ -114,6 +115,7 @@ def beyond_recorded(
         float(np.sqrt(np.mean([_turn(part) ** 2 for part in side])))
         for side in ([part for end in ends for part in trajectories(end)], cuts)
     )
+    least = RESOLUTION["turn_rate_radps"] * cuts[0].duration
     first, last, heights = (
         np.array([m.base_position[:, 2].mean() for m in side])
         for side in ([m.slice(0, window) for m in motions], ends, cuts)
@@ -125,7 +127,7 @@ def beyond_recorded(
     return {
         "turn_2s_rad": turn,
         "recorded_turn_2s_rad": usual,
-        "turn_over_recorded": turn / usual,
+        "turn_over_recorded": turn / max(usual, least),
         "height_over_recorded": float(np.median(np.abs(last - first))) / tolerance,
     }
 

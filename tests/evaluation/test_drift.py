@@ -114,6 +114,15 @@ def test_turning_and_sinking_beyond_recordings_by_hand():
     ) == pytest.approx(1.0, rel=1e-3)
 
 
+def test_recordings_that_hardly_turn_allow_what_does_not_matter():
+    """A turn of .01 rad/s against none: .01 / .02 of the least that matters."""
+    found = beyond_recorded(
+        [synthetic_motion(seconds=24.0, turn=0.01)], [synthetic_motion(seconds=3.0)]
+    )
+    assert found["recorded_turn_2s_rad"] == pytest.approx(0.0, abs=1e-9)
+    assert found["turn_over_recorded"] == pytest.approx(0.5, rel=1e-3)
+
+
 def test_a_lost_rhythm_is_drift():
     """The robot stops and stands; its speed tells as well."""
     motions = []

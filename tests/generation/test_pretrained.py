@@ -122,6 +122,19 @@ def test_gaits_change_without_a_jump_and_within_a_second(text):
         assert abs(np.mean(reached) - np.mean(speeds[after])) <= near
 
 
+def test_a_pace_is_a_trot_by_its_legs_a_second_after_the_change():
+    """The left front leg swings with the left rear one, then with the right rear one."""
+    model, schedule = (
+        pretrained_motion_model("go2"),
+        parse_schedule("dog-pace,dog-trot@4"),
+    )
+    for motion in generate_motions(model, schedule, 8.0, range(4)):
+        thighs = motion.joint_positions[:, 1::3]
+        for frames, partner in ((thighs[:200], 2), (thighs[250:], 3)):
+            with_fl = np.corrcoef(frames.T)[0]
+            assert with_fl[partner] == max(with_fl[1:])
+
+
 THREADS = """
 import hashlib, numpy as np, torch
 from loco_drake.evaluation.gait_change import forward_speed, roughness
