@@ -6,7 +6,9 @@ from pydrake.systems.framework import (
     Context,
     Diagram,
     DiagramBuilder,
+    InputPort,
     LeafSystem,
+    OutputPort,
 )
 
 from loco_drake.models.plant import AddRobotPlant
@@ -23,9 +25,11 @@ from .plan_state import PlanState
 from .pretrained import policy_path
 from .scenario import (
     ExternalAction,
+    ExternalTargets,
     GeneratedReference,
     MotionReference,
     Scenario,
+    TrainedPolicy,
 )
 from .toppra_smoother import ToppraSmoother
 from .tracking_policy import TrackingPolicy
@@ -43,19 +47,20 @@ def MakeLocomotionDiagram(
         input_ports:
         - gait (optional, of a generated reference: index into LABELS)
         - action (of ExternalAction)
+        - desired_state (of ExternalTargets)
         output_ports:
         - plan
         - plan_state
         - path_time
         - state
-        - observation
+        - observation (not of ExternalTargets, nor are the next two)
         - action
         - desired_state
         - net_actuation
         - reward_terms
 
     The subsystems are named plant, scene_graph, reference, smoother, observation,
-    policy, joint_targets, plan_state and reward. Simulate it like this, since a robot
+    policy, joint_targets, plan_state and reward; what is not asked for is not there. Simulate it like this, since a robot
     must start where its plan starts::
 
         simulator = Simulator(diagram)
@@ -91,27 +96,11 @@ def MakeLocomotionDiagram(
     if reference.HasInputPort("gait"):
         builder.ExportInput(reference.GetInputPort("gait"), "gait")
 
-    targets = builder.AddNamedSystem("joint_targets", JointTargets(robot))
-    builder.Connect(plan, targets.GetInputPort("plan"))
-    builder.Connect(
-        targets.GetOutputPort("desired_state"),
-        plant.get_desired_state_input_port(instance),
-    )
-    observation = builder.AddNamedSystem("observation", Observation(robot))
-    builder.Connect(plan, observation.GetInputPort("plan"))
-    builder.Connect(state, observation.GetInputPort("state"))
-    builder.Connect(targets.GetOutputPort("action"), observation.GetInputPort("action"))
-    if isinstance(scenario.policy, ExternalAction):
-        builder.ExportInput(targets.GetInputPort("action"), "action")
+    desired_state = plant.get_desired_state_input_port(instance)
+    if isinstance(scenario.policy, ExternalTargets):
+        builder.ExportInput(desired_state, "desired_state")
     else:
-        weights = scenario.policy.weights or policy_path(robot)
-        policy = builder.AddNamedSystem(
-            "policy", TrackingPolicy(load_actor(weights, robot))
-        )
-        builder.Connect(
-            observation.GetOutputPort("observation"), policy.GetInputPort("observation")
-        )
-        builder.Connect(policy.GetOutputPort("action"), targets.GetInputPort("action"))
+        _AddControl(builder, robot, scenario.policy, plan, state, desired_state)
 
     reward = builder.AddNamedSystem("reward", TrackingReward(robot))
     builder.Connect(plan, reward.GetInputPort("plan"))
@@ -122,9 +111,6 @@ def MakeLocomotionDiagram(
     builder.ExportOutput(plan_state.GetOutputPort("state"), "plan_state")
     builder.ExportOutput(plan_state.GetOutputPort("path_time"), "path_time")
     builder.ExportOutput(state, "state")
-    builder.ExportOutput(observation.GetOutputPort("observation"), "observation")
-    builder.ExportOutput(targets.GetOutputPort("action"), "action")
-    builder.ExportOutput(targets.GetOutputPort("desired_state"), "desired_state")
     builder.ExportOutput(plant.get_net_actuation_output_port(instance), "net_actuation")
     builder.ExportOutput(reward.GetOutputPort("reward_terms"), "reward_terms")
 
@@ -154,6 +140,38 @@ def _AddReference(
     if isinstance(reference, MotionReference):
         plan = plan_from_motion(robot, load_motion(reference.path))
     return builder.AddNamedSystem("reference", PlanPlayer(robot, plan))
+
+
+def _AddControl(
+    builder: DiagramBuilder,
+    robot: Robot,
+    config: TrainedPolicy | ExternalAction,
+    plan: OutputPort,
+    state: OutputPort,
+    desired_state: InputPort,
+) -> None:
+    """Adds what turns plan and state into the PD's set-points."""
+    targets = builder.AddNamedSystem("joint_targets", JointTargets(robot))
+    builder.Connect(plan, targets.GetInputPort("plan"))
+    builder.Connect(targets.GetOutputPort("desired_state"), desired_state)
+    observation = builder.AddNamedSystem("observation", Observation(robot))
+    builder.Connect(plan, observation.GetInputPort("plan"))
+    builder.Connect(state, observation.GetInputPort("state"))
+    builder.Connect(targets.GetOutputPort("action"), observation.GetInputPort("action"))
+    if isinstance(config, ExternalAction):
+        builder.ExportInput(targets.GetInputPort("action"), "action")
+    else:
+        weights = config.weights or policy_path(robot)
+        policy = builder.AddNamedSystem(
+            "policy", TrackingPolicy(load_actor(weights, robot))
+        )
+        builder.Connect(
+            observation.GetOutputPort("observation"), policy.GetInputPort("observation")
+        )
+        builder.Connect(policy.GetOutputPort("action"), targets.GetInputPort("action"))
+    builder.ExportOutput(observation.GetOutputPort("observation"), "observation")
+    builder.ExportOutput(targets.GetOutputPort("action"), "action")
+    builder.ExportOutput(targets.GetOutputPort("desired_state"), "desired_state")
 
 
 def StartOnPlan(simulator: Simulator, diagram: Diagram | None = None) -> None:

@@ -55,6 +55,11 @@ class ExternalAction:
 
 
 @dataclass(kw_only=True)
+class ExternalTargets:
+    """Input port "desired_state" takes the place of policy and JointTargets."""
+
+
+@dataclass(kw_only=True)
 class Scenario:
     """Everything that :func:`MakeLocomotionDiagram` needs to know."""
 
@@ -69,7 +74,9 @@ class Scenario:
     # How the motion is re-timed; without it the plan is tracked as it was written.
     smoother: SmootherConfig | None = field(default_factory=SmootherConfig)
     # What drives the joints.
-    policy: TrainedPolicy | ExternalAction = field(default_factory=TrainedPolicy)
+    policy: TrainedPolicy | ExternalAction | ExternalTargets = field(
+        default_factory=TrainedPolicy
+    )
 
 
 def LoadScenario(

@@ -1,4 +1,4 @@
-"""Many robots that follow plans, each in a Context of one diagram."""
+"""Many robots that follow plans, simulated one after the other in one Context."""
 
 from functools import lru_cache
 
@@ -10,9 +10,10 @@ from pydrake.systems.framework import Diagram
 from loco_drake.models.plant import ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.diagram import MakeLocomotionDiagram
+from loco_drake.systems.joint_targets import joint_targets
 from loco_drake.systems.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.systems.plan import PLAN_DT, Plan
-from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
+from loco_drake.systems.scenario import ExternalTargets, PlanReference, Scenario
 from loco_drake.systems.tracking_reward import reward_terms
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.terminations import is_lost
@@ -30,49 +31,54 @@ def _diagram(robot: str, contact: str, time_step: float, friction: float) -> Dia
             plant=plant,
             reference=PlanReference(),
             smoother=None,
-            policy=ExternalAction(),
+            policy=ExternalTargets(),
         )
     )
 
 
-class _Robot:
-    """One robot: a Context of the diagram, and the simulator that advances it."""
+class _Physics:
+    """One control period of a robot, as a function of its state and its targets.
 
-    def __init__(self, diagram: Diagram, plant: PlantConfig) -> None:
+    [q, v] is all the state of the diagram, and the plant does not know the time, so
+    that one Context serves all robots: with one for each, every step would find the
+    caches of the processor filled with those of the others.
+    """
+
+    def __init__(self, config: EnvironmentConfig) -> None:
+        plant = config.plant
+        diagram = _diagram(config.robot, plant.contact, plant.time_step, plant.friction)
         self._simulator = Simulator(diagram, diagram.CreateDefaultContext())
         ConfigureSimulator(self._simulator, plant)
         self._context = self._simulator.get_mutable_context()
         self._plant = diagram.GetSubsystemByName("plant")
         self._plant_context = self._plant.GetMyMutableContextFromRoot(self._context)
-        self._player = diagram.GetSubsystemByName("reference")
-        self._player_context = self._player.GetMyMutableContextFromRoot(self._context)
-        self._targets = diagram.GetSubsystemByName("joint_targets")
-        self._targets_context = self._targets.GetMyMutableContextFromRoot(self._context)
-        action = diagram.GetInputPort("action").FixValue(self._context, np.zeros(12))
-        self._action = action.GetMutableData()
+        port = diagram.GetInputPort("desired_state")
+        self._desired_state = port.FixValue(self._context, np.zeros(port.size()))
 
-    def reset(self, plan: Plan, sample: int, state: Array) -> None:
-        """Puts the robot in ``state``, at a sample of the plan that it is to follow."""
-        # What is set here is all the state there is.
-        self._targets.SetDefaultContext(self._targets_context)
-        self._context.SetTime(sample * PLAN_DT)
-        self._player.SetPlan(self._player_context, plan)
+    def advance(self, state: Array, desired_state: Array) -> Array:
+        """Returns the state [q, v], (37,), one control period after ``state``.
+
+        Args:
+            state: as what is returned.
+            desired_state: of the PD, [q_d, v_d], shape (24,).
+        """
+        self._context.SetTime(0.0)
         self._plant.SetPositionsAndVelocities(self._plant_context, state)
+        # GetMutableData tells what depends on it that it changes.
+        self._desired_state.GetMutableData().get_mutable_value().set_value(
+            desired_state
+        )
         self._simulator.Initialize()
-
-    def advance(self, action: Array, sample: int) -> Array:
-        """Simulates until the time of ``sample``; returns the state [q, v], (37,)."""
-        self._action.get_mutable_value().set_value(action)
-        self._simulator.AdvanceTo(sample * PLAN_DT, interruptible=False)
+        self._simulator.AdvanceTo(PLAN_DT, interruptible=False)
         return np.asarray(self._plant.GetPositionsAndVelocities(self._plant_context))
 
 
 class TrackingBatch:
     """B robots that follow plans, one control period at a time.
 
-    What is computed from the states, observations, rewards and terminations, is
-    computed for all robots at once, by the functions that the systems of the same names
-    use: for one robot alone it would cost as much as the physics.
+    What is computed from the states, joint targets, observations, rewards and
+    terminations, is computed for all robots at once, by the functions that the systems
+    of the same names use: for one robot alone it would cost as much as the physics.
 
     Args:
         plans: what to follow.
@@ -91,13 +97,12 @@ class TrackingBatch:
         self._plans = plans
         self._config = config
         self._robot = get_robot(config.robot)
-        plant = config.plant
-        diagram = _diagram(config.robot, plant.contact, plant.time_step, plant.friction)
-        self._robots = [_Robot(diagram, plant) for _ in range(count)]
+        self._physics = _Physics(config)
         self._lengths = np.array([len(plan) for plan in plans])
         # All samples of all plans, one after the other, for one look-up a step.
         self._first = np.cumsum(self._lengths) - self._lengths
         self._wanted = np.concatenate([plan.state for plan in plans])
+        self._set_points = np.concatenate([plan.set_points for plan in plans])
         self._toes = np.concatenate([plan.p_BoF_H for plan in plans])
         self._contacts = np.concatenate([plan.contacts for plan in plans])
         self._labels = np.concatenate([plan.labels for plan in plans])
@@ -132,10 +137,9 @@ class TrackingBatch:
             sample = int(random.integers(max(1, length - steps // 2)))
         self.plan[i], self.start[i], self.sample[i] = plan, sample, sample
         self._last[i] = min(sample + steps, length - 1)
-        followed = self._plans[plan]
-        state = self._config.reset_noise.draw(followed.state[sample], random)
-        self._robots[i].reset(followed, sample, state)
-        self._state[i], self._action[i] = state, 0.0
+        wanted = self._plans[plan].state[sample]
+        self._state[i] = self._config.reset_noise.draw(wanted, random)
+        self._action[i] = 0.0
 
     def step(
         self, actions: NDArray[np.floating]
@@ -150,9 +154,10 @@ class TrackingBatch:
         """
         self._action[:] = actions
         self.sample += 1
-        for i, robot in enumerate(self._robots):
-            self._state[i] = robot.advance(self._action[i], int(self.sample[i]))
         now = self._first[self.plan] + self.sample
+        desired_state = joint_targets(self._set_points[now], self._action)
+        for i, state in enumerate(self._state):
+            self._state[i] = self._physics.advance(state, desired_state[i])
         wanted, toes = self._wanted[now], self._toes[now]
         terms = reward_terms(self._robot, wanted, toes, self._state)
         lost = is_lost(self._robot, self._config.termination, self._state, wanted)
