@@ -54,15 +54,16 @@ def _step(
     observations = batch.observe()
     done = terminated | truncated
     infos: list[dict[str, Any]] = [{} for _ in next_plans]
-    for i in np.flatnonzero(done):
+    ended = np.flatnonzero(done)
+    for i in ended:
         infos[i] = {
             "plan": int(batch.plan[i]),
             "TimeLimit.truncated": bool(truncated[i]),
             "terminal_observation": observations[i].copy(),
         }
         batch.reset(int(i), random[i], next_plans[i])
-    if done.any():
-        observations = batch.observe()
+    if len(ended):
+        observations[ended] = batch.observe(ended)
     return observations, terms.sum(axis=-1), done, infos
 
 
