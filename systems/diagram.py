@@ -47,21 +47,21 @@ def MakeLocomotionDiagram(
         input_ports:
         - gait (optional, of a generated reference: index into LABELS)
         - action (of ExternalAction)
-        - desired_state (of ExternalTargets)
+        - desired_state (of ExternalTargets, which has only the last two outputs)
         output_ports:
         - plan
         - plan_state
         - path_time
-        - state
-        - observation (not of ExternalTargets, nor are the next two)
+        - observation
         - action
         - desired_state
-        - net_actuation
         - reward_terms
+        - state
+        - net_actuation
 
     The subsystems are named plant, scene_graph, reference, smoother, observation,
-    policy, joint_targets, plan_state and reward; what is not asked for is not there. Simulate it like this, since a robot
-    must start where its plan starts::
+    policy, joint_targets, plan_state and reward; what is not asked for is not there.
+    Simulate it like this, since a robot must start where its plan starts::
 
         simulator = Simulator(diagram)
         StartOnPlan(simulator)
@@ -78,7 +78,33 @@ def MakeLocomotionDiagram(
     builder = DiagramBuilder()
     plant, scene_graph, instance = AddRobotPlant(builder, robot, scenario.plant)
     state = plant.get_state_output_port()
+    desired_state = plant.get_desired_state_input_port(instance)
+    plan = None
+    if isinstance(scenario.policy, ExternalTargets):
+        builder.ExportInput(desired_state, "desired_state")
+    else:
+        plan = _AddPlan(builder, robot, scenario)
+        _AddControl(builder, robot, scenario.policy, plan, state, desired_state)
+        _AddScores(builder, robot, plan, state)
+    builder.ExportOutput(state, "state")
+    builder.ExportOutput(plant.get_net_actuation_output_port(instance), "net_actuation")
 
+    if meshcat is not None:
+        MeshcatVisualizer.AddToBuilder(
+            builder, scene_graph, meshcat, MeshcatVisualizerParams()
+        )
+        if plan is not None:
+            drawing = builder.AddNamedSystem(
+                "plan_visualizer", KeypointVisualizer(robot, meshcat)
+            )
+            builder.Connect(plan, drawing.GetInputPort("plan"))
+    diagram = builder.Build()
+    diagram.set_name("locomotion")
+    return diagram
+
+
+def _AddPlan(builder: DiagramBuilder, robot: Robot, scenario: Scenario) -> OutputPort:
+    """Adds what makes the plan, exports it and returns its port."""
     reference = _AddReference(builder, robot, scenario)
     plan = reference.GetOutputPort("plan")
     if scenario.smoother is not None:
@@ -95,36 +121,7 @@ def MakeLocomotionDiagram(
     builder.ExportOutput(plan, "plan")
     if reference.HasInputPort("gait"):
         builder.ExportInput(reference.GetInputPort("gait"), "gait")
-
-    desired_state = plant.get_desired_state_input_port(instance)
-    if isinstance(scenario.policy, ExternalTargets):
-        builder.ExportInput(desired_state, "desired_state")
-    else:
-        _AddControl(builder, robot, scenario.policy, plan, state, desired_state)
-
-    reward = builder.AddNamedSystem("reward", TrackingReward(robot))
-    builder.Connect(plan, reward.GetInputPort("plan"))
-    builder.Connect(state, reward.GetInputPort("state"))
-    plan_state = builder.AddNamedSystem("plan_state", PlanState(robot))
-    builder.Connect(plan, plan_state.GetInputPort("plan"))
-
-    builder.ExportOutput(plan_state.GetOutputPort("state"), "plan_state")
-    builder.ExportOutput(plan_state.GetOutputPort("path_time"), "path_time")
-    builder.ExportOutput(state, "state")
-    builder.ExportOutput(plant.get_net_actuation_output_port(instance), "net_actuation")
-    builder.ExportOutput(reward.GetOutputPort("reward_terms"), "reward_terms")
-
-    if meshcat is not None:
-        MeshcatVisualizer.AddToBuilder(
-            builder, scene_graph, meshcat, MeshcatVisualizerParams()
-        )
-        drawing = builder.AddNamedSystem(
-            "plan_visualizer", KeypointVisualizer(robot, meshcat)
-        )
-        builder.Connect(plan, drawing.GetInputPort("plan"))
-    diagram = builder.Build()
-    diagram.set_name("locomotion")
-    return diagram
+    return plan
 
 
 def _AddReference(
@@ -172,6 +169,20 @@ def _AddControl(
     builder.ExportOutput(observation.GetOutputPort("observation"), "observation")
     builder.ExportOutput(targets.GetOutputPort("action"), "action")
     builder.ExportOutput(targets.GetOutputPort("desired_state"), "desired_state")
+
+
+def _AddScores(
+    builder: DiagramBuilder, robot: Robot, plan: OutputPort, state: OutputPort
+) -> None:
+    """Adds what says how well the plan is followed."""
+    reward = builder.AddNamedSystem("reward", TrackingReward(robot))
+    builder.Connect(plan, reward.GetInputPort("plan"))
+    builder.Connect(state, reward.GetInputPort("state"))
+    builder.ExportOutput(reward.GetOutputPort("reward_terms"), "reward_terms")
+    plan_state = builder.AddNamedSystem("plan_state", PlanState(robot))
+    builder.Connect(plan, plan_state.GetInputPort("plan"))
+    builder.ExportOutput(plan_state.GetOutputPort("state"), "plan_state")
+    builder.ExportOutput(plan_state.GetOutputPort("path_time"), "path_time")
 
 
 def StartOnPlan(simulator: Simulator, diagram: Diagram | None = None) -> None:

@@ -56,7 +56,7 @@ class ExternalAction:
 
 @dataclass(kw_only=True)
 class ExternalTargets:
-    """Input port "desired_state" takes the place of policy and JointTargets."""
+    """The diagram's input port "desired_state" is the PD's: there is only the plant."""
 
 
 @dataclass(kw_only=True)

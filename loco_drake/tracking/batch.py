@@ -15,7 +15,7 @@ from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.joint_targets import joint_targets
 from loco_drake.systems.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.systems.plan import PLAN_DT, Plan
-from loco_drake.systems.scenario import ExternalTargets, PlanReference, Scenario
+from loco_drake.systems.scenario import ExternalTargets, Scenario
 from loco_drake.systems.tracking_reward import reward_terms
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.terminations import is_lost
@@ -28,13 +28,7 @@ def _diagram(robot: str, contact: str, time_step: float, friction: float) -> Dia
     # One per process: pydrake never frees diagrams with Python systems.
     plant = PlantConfig(contact=contact, time_step=time_step, friction=friction)
     return MakeLocomotionDiagram(
-        Scenario(
-            robot=robot,
-            plant=plant,
-            reference=PlanReference(),
-            smoother=None,
-            policy=ExternalTargets(),
-        )
+        Scenario(robot=robot, plant=plant, policy=ExternalTargets())
     )
 
 

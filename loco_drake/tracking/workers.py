@@ -1,6 +1,7 @@
 """Environments in worker processes, many to a worker, as one vectorized environment."""
 
 import contextlib
+import gc
 import multiprocessing
 import signal
 from collections.abc import Sequence
@@ -30,6 +31,8 @@ def _work(
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     batch = TrackingBatch(plans, config, len(seeds))
     random = [np.random.default_rng(seed) for seed in seeds]
+    # What there is now stays: the garbage collector need not look through it each time.
+    gc.freeze()
     try:
         while (message := pipe.recv()) is not None:
             actions, next_plans = message
