@@ -17,7 +17,8 @@ from .toppra_smoother import SmootherConfig
 class GeneratedReference:
     """Motion written by the generator while the simulation runs."""
 
-    # A gait label, source-gait.
+    # A gait label, source-gait; or several, the later ones with the s at which they
+    # begin, such as dog-pace,dog-trot@3.
     gait: str = "dog-trot"
     # What the tokens are drawn with.
     seed: int = 0

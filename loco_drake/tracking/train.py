@@ -25,6 +25,7 @@ from loco_drake.tracking.checkpoint import (
     start_from,
 )
 from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.learning_curve import PROGRESS, learning_curve
 from loco_drake.tracking.ppo import AdaptivePPO, PpoConfig, export_actor, make_ppo
 from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.workers import WorkerVecEnv
@@ -97,7 +98,8 @@ def train_tracker(
         report: called after each batch.
 
     Returns:
-        steps, wall_clock_s, interrupted, and the scores by label.
+        steps, wall_clock_s of this run, interrupted, the scores by label, the robot,
+        and the learning curve of all runs (:mod:`.learning_curve`).
 
     Raises:
         InputError: if there is nothing to resume or to begin with, or what there is was
@@ -154,11 +156,14 @@ def train_tracker(
         saver.save(learner)
     finally:
         environment.close()
+    log = folder / PROGRESS
     return {
+        "robot": config.environment.robot,
         "steps": learner.num_timesteps,
         "wall_clock_s": time.monotonic() - start,
         "interrupted": interrupted,
         "scores": sampler.score_by_label(),
+        "learning": learning_curve(log) if log.is_file() else None,
     }
 
 
@@ -224,7 +229,7 @@ class _Saver(BaseCallback):
             if isinstance(value, int | float | np.floating)
         }
         self.logger.dump(self.num_timesteps)
-        with (self._folder / "progress.jsonl").open("a") as log:
+        with (self._folder / PROGRESS).open("a") as log:
             line = {
                 "steps": self.num_timesteps,
                 "seconds": time.monotonic() - self._start,
