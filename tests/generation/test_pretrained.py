@@ -123,7 +123,7 @@ def test_gaits_change_without_a_jump_and_within_a_second(text):
 
 
 def test_a_pace_is_a_trot_by_its_legs_a_second_after_the_change():
-    """The left front leg swings with the left rear one, then with the right rear one."""
+    """The left front leg swings with the left rear one, then with the right one."""
     model, schedule = (
         pretrained_motion_model("go2"),
         parse_schedule("dog-pace,dog-trot@4"),
