@@ -31,7 +31,7 @@ class TrainGenerator:
     """Weights from `train tokenizer`."""
     out: Path = Path("runs/generator")
     """Folder for the weights (generator.safetensors), checkpoint and logs."""
-    books: int = 4
+    books: int = 8
     """Codebooks of the tokenizer that it writes, the coarsest first. Finer ones hold
     what is too irregular to be predicted."""
     steps: int = 6000
