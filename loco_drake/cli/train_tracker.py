@@ -19,6 +19,7 @@ from loco_drake.errors import InputError
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.ppo import PpoConfig
 from loco_drake.tracking.references import load_references
 from loco_drake.tracking.train import Progress as TrainingProgress
 from loco_drake.tracking.train import TrainingConfig, train_tracker
@@ -43,6 +44,8 @@ class TrainTracker:
     """Processes that simulate."""
     per_worker: int = 8
     """Environments in each process."""
+    batch: int = PpoConfig.batch
+    """Environment steps between updates; what is saved lags no more behind."""
     plant: PlantConfig = field(default_factory=PlantConfig)
     """Contact solver, time step and friction."""
     seed: int = 0
@@ -58,6 +61,12 @@ class TrainTracker:
         for name in ("steps", "workers", "per_worker"):
             if getattr(self, name) < 1:
                 raise InputError(f"{name} must be at least 1.")
+        environments = self.workers * self.per_worker
+        if self.batch < 2 * environments:
+            raise InputError(
+                f"--batch must be at least {2 * environments}, two steps of each of "
+                f"{environments} environments, not {self.batch}."
+            )
         self.plant.check()
         plans = load_references(robot, self.references)
         config = TrainingConfig(
@@ -66,6 +75,9 @@ class TrainTracker:
             per_worker=self.per_worker,
             seed=self.seed,
             environment=EnvironmentConfig(robot=self.robot, plant=self.plant),
+            ppo=PpoConfig(
+                batch=self.batch, minibatch=min(self.batch, PpoConfig.minibatch)
+            ),
         )
         # A second thread gains little, and spins where another program has its core.
         torch.set_num_threads(1)

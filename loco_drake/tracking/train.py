@@ -78,8 +78,8 @@ def train_tracker(
 
     Writes to ``folder`` after each batch: ``checkpoint.safetensors``, with which
     training can be resumed, ``policy.safetensors``, which the diagram loads,
-    ``progress.jsonl`` and TensorBoard logs. An interruption (Ctrl-C) loses at most the
-    batch being collected.
+    ``progress.jsonl`` and TensorBoard logs. An interruption (Ctrl-C), or being killed,
+    loses at most the batch being collected.
 
     Returns:
         steps, wall_clock_s, interrupted, and the scores by label.
@@ -87,6 +87,7 @@ def train_tracker(
     Raises:
         InputError: if there is nothing to resume, or what there is was trained with
             other networks or for another robot.
+        ChildProcessError: if a worker process is killed.
     """
     folder = Path(folder)
     checkpoint = folder / CHECKPOINT
@@ -100,6 +101,8 @@ def train_tracker(
                 f"{checkpoint} is of {header['config']['fixed']}, not of {fixed}."
             )
     folder.mkdir(parents=True, exist_ok=True)
+    for unfinished in folder.glob(".*.safetensors"):
+        unfinished.unlink()  # what a training was writing when it was killed
 
     start = time.monotonic()
     steps_before = 0 if saved is None else int(saved["steps"])

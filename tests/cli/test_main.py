@@ -122,6 +122,7 @@ WRONG = {
     "train generator --motions FILES/motions --tokenizer FILES/no": "no tokenizer",
     "train tracker --references FILES/empty": r"no Motion files \(\*.npz\)",
     "train tracker --references FILES/empty --robot spot": "the choices are go2, a1",
+    "train tracker --references FILES/empty --batch 9": "--batch must be at least 32",
     "train tracker --references FILES/empty --steps 0": "steps must be at least 1",
 }
 
