@@ -38,6 +38,7 @@ from loco_drake.systems.toppra_smoother import smooth_plan
 from loco_drake.systems.tracking_reward import reward_terms
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.randomization import STANDARD, RandomizationConfig
 from loco_drake.tracking.terminations import TerminationConfig, is_lost
 
 ROBOT = "go2"
@@ -74,9 +75,13 @@ class Episode:
 class Environment:
     """Steps the environments of one training worker and remembers their episodes."""
 
-    def __init__(self, plans: list[Plan], config: PlantConfig) -> None:
+    def __init__(
+        self, plans: list[Plan], config: PlantConfig, randomization: RandomizationConfig
+    ) -> None:
         self._plans = plans
-        environment = EnvironmentConfig(robot=ROBOT, plant=config)
+        environment = EnvironmentConfig(
+            robot=ROBOT, plant=config, randomization=randomization
+        )
         self._batch = TrackingBatch(plans, environment, ROBOTS)
         self._random = np.random.default_rng(0)
         self.resets = 0
@@ -188,12 +193,17 @@ def main() -> None:
     parser.add_argument("--turns", type=int, default=15)
     parser.add_argument("--contact", default="similar")
     parser.add_argument("--time-step", type=float, default=0.01, help="s")
+    parser.add_argument(
+        "--randomize", action="store_true", help="all parts, but for the bare plant"
+    )
     parser.add_argument("--json", type=Path, help="where to write the figures")
     arguments = parser.parse_args()
 
     config = PlantConfig(contact=arguments.contact, time_step=arguments.time_step)
     plans = make_plans()
-    environment, bare = Environment(plans, config), BarePlant(config)
+    randomization = STANDARD if arguments.randomize else RandomizationConfig()
+    environment = Environment(plans, config, randomization)
+    bare = BarePlant(config)
     steps = arguments.steps
     bare.follow(environment.run(100)[1])  # warm
     environment.resets, environment.reset_seconds = 0, 0.0

@@ -9,13 +9,20 @@ from pydrake.geometry import (
     InMemoryMesh,
     Mesh,
     ProximityProperties,
+    RoleAssign,
+    SceneGraph,
 )
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.systems.framework import Context
 
 # So much stiffer than the feet that theirs is the stiffness of the contact:
 # k = k_foot k_ground / (k_foot + k_ground).
 _STIFFNESS = 1e9
+
+# Of the feet, s/m. That of a contact is the mean of both, weighted by the other's
+# stiffness.
+_FOOT_DISSIPATION = 1.0
 
 _TILE = 0.5  # m; shows at a glance how far and how fast a robot goes
 _TILES = 60  # along each side
@@ -55,6 +62,41 @@ def AddGround(plant: MultibodyPlant, *, friction: float, visual: bool) -> None:
         )
         floor.set_illustration_properties(IllustrationProperties())
         plant.RegisterVisualGeometry(world, floor)
+
+
+def SetGround(
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    context: Context,
+    *,
+    friction: float | None = None,
+    stiffness: float | None = None,
+) -> None:
+    """Changes the ground in a Context; what is None stays as it is.
+
+    Args:
+        plant: with a ground of :func:`AddGround`.
+        scene_graph: that the plant is registered with.
+        context: the scene graph's.
+        friction: Coulomb coefficient, static and dynamic.
+        stiffness: in N/m; that of a contact is k_foot k / (k_foot + k). Such ground
+            is damped like the feet, so that the damping of a contact stays theirs.
+    """
+    (ground,) = plant.GetCollisionGeometriesForBody(plant.world_body())
+    inspector = scene_graph.get_query_output_port().Eval(context).inspector()
+    properties = ProximityProperties(inspector.GetProximityProperties(ground))
+    if friction is not None:
+        properties.UpdateProperty(
+            "material", "coulomb_friction", CoulombFriction(friction, friction)
+        )
+    if stiffness is not None:
+        for name, value in (
+            ("point_contact_stiffness", stiffness),
+            ("hunt_crossley_dissipation", _FOOT_DISSIPATION),
+        ):
+            properties.UpdateProperty("material", name, value)
+    source = plant.get_source_id()
+    scene_graph.AssignRole(context, source, ground, properties, RoleAssign.kReplace)
 
 
 def _floor() -> Mesh:

@@ -18,6 +18,21 @@ from .symmetry import mirror_actions, mirror_observations
 
 KIND = "policy"
 OBSERVATION_CLIP = 5.0  # standard deviations
+# Parts of the observation that take the base's position in the world, or its velocity.
+PRIVILEGED = ("v_WB_H", "height", "plan_p_H")
+
+
+def unprivileged_mask() -> Tensor:
+    """Returns 0 for privileged parts of the observation, else 1, (OBSERVATION_SIZE,).
+
+    Normalized observations are multiplied by it: hidden parts are always at their mean.
+    """
+    return torch.cat(
+        [
+            torch.full((size,), float(name not in PRIVILEGED))
+            for name, size in OBSERVATION_LAYOUT
+        ]
+    )
 
 
 @dataclass(kw_only=True)
@@ -31,6 +46,8 @@ class ActorConfig:
         observation_layout: names and sizes of the parts of the observation.
         action_scale: rad per unit of action.
         rate: actions per second.
+        privileged: whether it sees what a robot outside simulation does not know well,
+            :data:`PRIVILEGED`.
     """
 
     robot: str
@@ -41,6 +58,7 @@ class ActorConfig:
     )
     action_scale: float = ACTION_SCALE
     rate: float = FPS
+    privileged: bool = True
 
 
 class Actor(nn.Module):
@@ -52,12 +70,14 @@ class Actor(nn.Module):
 
     mean: Tensor
     variance: Tensor
+    mask: Tensor
 
     def __init__(self, config: ActorConfig) -> None:
         super().__init__()
         self.config = config
         self.register_buffer("mean", torch.zeros(OBSERVATION_SIZE))
         self.register_buffer("variance", torch.ones(OBSERVATION_SIZE))
+        self.register_buffer("mask", unprivileged_mask(), persistent=False)
         layers: list[nn.Module] = []
         width = OBSERVATION_SIZE
         for hidden in config.hidden:
@@ -69,6 +89,8 @@ class Actor(nn.Module):
         """Returns actions (..., 12) for observations (..., OBSERVATION_SIZE)."""
         normal = (observation - self.mean) / torch.sqrt(self.variance + 1e-8)
         normal = normal.clamp(-OBSERVATION_CLIP, OBSERVATION_CLIP)
+        if not self.config.privileged:
+            normal = normal * self.mask
         image = self.layers(mirror_observations(normal))
         action: Tensor = (self.layers(normal) + mirror_actions(image)) / 2
         return action
@@ -103,7 +125,12 @@ def load_actor(path: Path, robot: Robot) -> Actor:
         raise InputError(
             f"The policy in {path} is of another version of loco_drake."
         ) from None
-    expected = ActorConfig(robot=robot.name, labels=config.labels, hidden=config.hidden)
+    expected = ActorConfig(
+        robot=robot.name,
+        labels=config.labels,
+        hidden=config.hidden,
+        privileged=config.privileged,
+    )
     for name, value in asdict(expected).items():
         if getattr(config, name) != value:
             what = name.replace("_", " ")

@@ -1,6 +1,7 @@
 """The diagram of a robot that does what a plan says."""
 
 from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import (
     Context,
@@ -16,6 +17,7 @@ from loco_drake.models.robots import Robot, get_robot
 from loco_drake.motion import load_motion
 
 from .actor import load_actor
+from .actuation import Actuation
 from .joint_targets import JointTargets
 from .keypoint_visualizer import KeypointVisualizer
 from .observation import Observation
@@ -23,6 +25,7 @@ from .plan import Plan, plan_from_motion
 from .plan_player import PlanPlayer
 from .plan_state import PlanState
 from .pretrained import policy_path
+from .pushes import Pushes
 from .scenario import (
     ExternalAction,
     ExternalTargets,
@@ -31,6 +34,7 @@ from .scenario import (
     Scenario,
     TrainedPolicy,
 )
+from .sensors import Sensors
 from .toppra_smoother import ToppraSmoother
 from .tracking_policy import TrackingPolicy
 from .tracking_reward import TrackingReward
@@ -60,7 +64,8 @@ def MakeLocomotionDiagram(
         - net_actuation
 
     The subsystems are named plant, scene_graph, reference, smoother, observation,
-    policy, joint_targets, plan_state and reward; what is not asked for is not there.
+    policy, joint_targets, plan_state and reward, and actuation, pushes and sensors of
+    the scenario's disturbances; what is not asked for is not there.
     Simulate it like this, since a robot must start where its plan starts::
 
         simulator = Simulator(diagram)
@@ -79,12 +84,15 @@ def MakeLocomotionDiagram(
     plant, scene_graph, instance = AddRobotPlant(builder, robot, scenario.plant)
     state = plant.get_state_output_port()
     desired_state = plant.get_desired_state_input_port(instance)
+    measured, desired_state = _AddDisturbances(
+        builder, robot, scenario, plant, desired_state
+    )
     plan = None
     if isinstance(scenario.policy, ExternalTargets):
         builder.ExportInput(desired_state, "desired_state")
     else:
         plan = _AddPlan(builder, robot, scenario)
-        _AddControl(builder, robot, scenario.policy, plan, state, desired_state)
+        _AddControl(builder, robot, scenario.policy, plan, measured, desired_state)
         _AddScores(builder, robot, plan, state)
     builder.ExportOutput(state, "state")
     builder.ExportOutput(plant.get_net_actuation_output_port(instance), "net_actuation")
@@ -101,6 +109,40 @@ def MakeLocomotionDiagram(
     diagram = builder.Build()
     diagram.set_name("locomotion")
     return diagram
+
+
+def _AddDisturbances(
+    builder: DiagramBuilder,
+    robot: Robot,
+    scenario: Scenario,
+    plant: MultibodyPlant,
+    desired_state: InputPort,
+) -> tuple[OutputPort, InputPort]:
+    """Adds what makes the world unlike the model.
+
+    Returns:
+        The state as it is measured, and the port that takes the PD's set-points.
+    """
+    state = measured = plant.get_state_output_port()
+    if scenario.disturbances.actuation:
+        actuation = builder.AddNamedSystem(
+            "actuation", Actuation(robot, scenario.plant)
+        )
+        builder.Connect(state, actuation.GetInputPort("state"))
+        builder.Connect(actuation.GetOutputPort("desired_state"), desired_state)
+        desired_state = actuation.GetInputPort("desired_state")
+    if scenario.disturbances.pushes:
+        trunk = plant.GetBodyByName(robot.trunk_frame).index()
+        pushes = builder.AddNamedSystem("pushes", Pushes(trunk))
+        builder.Connect(
+            pushes.GetOutputPort("spatial_forces"),
+            plant.get_applied_spatial_force_input_port(),
+        )
+    if scenario.disturbances.sensors:
+        sensors = builder.AddNamedSystem("sensors", Sensors(robot))
+        builder.Connect(state, sensors.GetInputPort("state"))
+        measured = sensors.GetOutputPort("state")
+    return measured, desired_state
 
 
 def _AddPlan(builder: DiagramBuilder, robot: Robot, scenario: Scenario) -> OutputPort:
@@ -168,7 +210,10 @@ def _AddControl(
         builder.Connect(policy.GetOutputPort("action"), targets.GetInputPort("action"))
     builder.ExportOutput(observation.GetOutputPort("observation"), "observation")
     builder.ExportOutput(targets.GetOutputPort("action"), "action")
-    builder.ExportOutput(targets.GetOutputPort("desired_state"), "desired_state")
+    # What reaches the PD.
+    last = "actuation" if builder.HasSubsystemNamed("actuation") else "joint_targets"
+    sent = builder.GetSubsystemByName(last).GetOutputPort("desired_state")
+    builder.ExportOutput(sent, "desired_state")
 
 
 def _AddScores(

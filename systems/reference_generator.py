@@ -14,7 +14,9 @@ from pydrake.systems.framework import (
 )
 
 from loco_drake.errors import InputError
-from loco_drake.gaits import parse_label
+from loco_drake.gait_schedule import GaitSchedule, parse_schedule
+from loco_drake.gaits import LABELS
+from loco_drake.generation.generate import check_sampling, chunk_labels
 from loco_drake.generation.motion_model import MotionModel, Stream
 from loco_drake.generation.pretrained import pretrained_motion_model
 from loco_drake.models.robots import Robot
@@ -30,7 +32,7 @@ _KEEP = 1.0  # seconds of plan kept behind what has been used up
 class _Script:
     """Immutable state: what has been written, and how to go on."""
 
-    label: int
+    schedule: GaitSchedule
     stream: Stream
     plan: Plan | None = None
 
@@ -51,10 +53,12 @@ class ReferenceGenerator(LeafSystem):
         - plan
 
     ``path_time`` (s) is how much of the plan has been used up: what the smoother has
-    committed; if it is not connected, the context's time. ``gait`` is an index into
-    :data:`loco_drake.gaits.LABELS` that overrides the configured label for the chunks
-    still to be written. What is written depends only on seed, number of the chunk and
-    labels, so that a Context that is cloned or reset repeats it exactly.
+    committed; if it is not connected, the context's time. The configured gait may be a
+    schedule, whose times are on the plan's clock and are kept to a token. ``gait`` is
+    an index into :data:`loco_drake.gaits.LABELS` that overrides it for the chunks still
+    to be written, so that a change comes ``horizon`` and up to a chunk later. What is
+    written depends only on seed, number of the chunk and labels, so that a Context that
+    is cloned or reset repeats it exactly.
 
     Args:
         robot: the robot that is to move.
@@ -99,7 +103,7 @@ class ReferenceGenerator(LeafSystem):
 
         Args:
             context: this system's own.
-            gait: a gait label.
+            gait: a gait label, or a schedule of several.
             seed: what the tokens are drawn with.
         """
         _check(replace(self._config, gait=gait, seed=seed))
@@ -111,8 +115,9 @@ class ReferenceGenerator(LeafSystem):
         stream = self._model.start(
             np.array([seed]), duration=float(self._config.duration)
         )
-        script = _Script(parse_label(gait).index, stream)
-        return self._written(script, script.label, 0.0)
+        schedule = parse_schedule(gait)
+        self._model.check_labels(schedule.at(schedule.starts))
+        return self._written(_Script(schedule, stream), schedule, 0.0)
 
     def _calc_plan(self, context: Context, output: AbstractValue) -> None:
         output.set_value(self._get(context).plan)
@@ -124,24 +129,30 @@ class ReferenceGenerator(LeafSystem):
 
     def _update(self, context: Context, state: State) -> EventStatus:
         old = self._get(context)
-        label = old.label
+        schedule = old.schedule
         if self._gait.HasValue(context):
-            label = int(self._gait.Eval(context)[0])
+            index = int(self._gait.Eval(context)[0])
+            if not 0 <= index < len(LABELS):
+                raise InputError(
+                    f"The gait must be an index from 0 to {len(LABELS) - 1}, "
+                    f"not {index}."
+                )
+            schedule = GaitSchedule((LABELS[index],))
         used = context.get_time()
         if self._path_time.HasValue(context):
             used = float(self._path_time.Eval(context)[0])
-        new = self._written(old, label, used)
+        new = self._written(old, schedule, used)
         if new is old:
             return EventStatus.DidNothing()
         state.get_mutable_abstract_state(int(self._script)).set_value(new)
         return EventStatus.Succeeded()
 
-    def _written(self, script: _Script, label: int, used: float) -> _Script:
+    def _written(self, script: _Script, schedule: GaitSchedule, used: float) -> _Script:
         """Returns ``script`` with chunks added until the horizon is reached."""
         while script.plan is None or (script.plan.path_time[-1] < used + self._horizon):
             stream, frames = self._model.extend(
                 script.stream,
-                np.array([label]),
+                chunk_labels(self._model, schedule, script.stream.chunk)[None],
                 temperature=self._config.temperature,
                 top_p=self._config.top_p,
             )
@@ -159,7 +170,7 @@ class ReferenceGenerator(LeafSystem):
                 open_ended=True,
             )
             script = _Script(
-                label, stream, added if plan is None else join_plans(plan, added)
+                schedule, stream, added if plan is None else join_plans(plan, added)
             )
         plan = script.plan
         assert plan is not None
@@ -171,14 +182,9 @@ class ReferenceGenerator(LeafSystem):
 
 def _check(config: GeneratedReference) -> None:
     """Raises InputError unless every field is sensible."""
-    parse_label(config.gait)
+    parse_schedule(config.gait)
     if config.seed < 0:
         raise InputError(f"The seed must be 0 or more, not {config.seed}.")
     if not (np.isfinite(config.duration) and config.duration > 0):
         raise InputError(f"The duration must be above 0 s, not {config.duration}.")
-    if not (np.isfinite(config.temperature) and config.temperature >= 0):
-        raise InputError(
-            f"The temperature must be 0 or more, not {config.temperature}."
-        )
-    if not 0 < config.top_p <= 1:
-        raise InputError(f"top_p must be above 0 and at most 1, not {config.top_p}.")
+    check_sampling(config.temperature, config.top_p)

@@ -17,7 +17,8 @@ from .toppra_smoother import SmootherConfig
 class GeneratedReference:
     """Motion written by the generator while the simulation runs."""
 
-    # A gait label, source-gait.
+    # A gait label, source-gait; or several, the later ones with the s at which they
+    # begin, such as dog-pace,dog-trot@3.
     gait: str = "dog-trot"
     # What the tokens are drawn with.
     seed: int = 0
@@ -59,6 +60,22 @@ class ExternalTargets:
     """The diagram's input port "desired_state" is the PD's: there is only the plant."""
 
 
+# Hashable: batches keep one diagram of each kind.
+@dataclass(kw_only=True, unsafe_hash=True)
+class Disturbances:
+    """Which systems a diagram has for domains unlike the model; see :mod:`.domain`.
+
+    They do nothing until SetDomain tells them what.
+    """
+
+    # Latency and strength of the motors.
+    actuation: bool = False
+    # Forces on the trunk.
+    pushes: bool = False
+    # Errors of what the policy sees of the robot's state.
+    sensors: bool = False
+
+
 @dataclass(kw_only=True)
 class Scenario:
     """Everything that :func:`MakeLocomotionDiagram` needs to know."""
@@ -77,6 +94,8 @@ class Scenario:
     policy: TrainedPolicy | ExternalAction | ExternalTargets = field(
         default_factory=TrainedPolicy
     )
+    # What there is between policy and robot beyond the model.
+    disturbances: Disturbances = field(default_factory=Disturbances)
 
 
 def LoadScenario(

@@ -70,6 +70,10 @@ def test_wheel_has_code_models_weights_and_configuration(wheel):
         "models/pretrained/tokenizer.safetensors",
         "models/pretrained/generator.safetensors",
         "models/pretrained/policy_go2.safetensors",
+        "models/pretrained/results/generation.json",
+        "models/pretrained/results/tracking-go2-generated.json",
+        "evaluation/report/templates/page.html",
+        "evaluation/report/templates/style.css",
         "systems/diagram.py",
     ):
         assert f"loco_drake/{name}" in found
@@ -83,8 +87,11 @@ def test_wheel_has_one_package_its_licence_and_no_recordings(wheel):
     assert {name.split("/")[0] for name in names} == {"loco_drake", info}
     assert f"{info}/licenses/LICENSE" in names
     suffixes = {Path(name).suffix for name in names if not name.startswith(info)}
-    data = {".urdf", ".xml", ".yaml", ".md", ".safetensors"}
-    assert suffixes <= {".py", ".typed", ".csv", *data}
+    data = {".urdf", ".xml", ".yaml", ".md", ".safetensors", ".json"}
+    page = {".html", ".css", ".js", ".svg"}
+    assert suffixes <= {".py", ".typed", ".csv", *data, *page}
+    results = {str(Path(name).parent) for name in names if name.endswith(".json")}
+    assert results == {"loco_drake/models/pretrained/results"}
     tables = {name for name in names if name.endswith(".csv")}
     assert tables == {f"loco_drake/datasets/{t}.csv" for t in ("manifest", "segments")}
     assert size < 20e6
@@ -162,6 +169,20 @@ def test_installed_wheel_has_the_command(installed, tmp_path):
     printed = run_python("-c", COMMAND, cwd=tmp_path, PYTHONPATH=str(installed))
     file = installed / "loco_drake" / "cli" / "main.py"
     assert printed == f"{__version__}\n0 {file}\n"
+
+
+REPORT = """
+from loco_drake.cli.main import main
+
+raise SystemExit(main(["report", "--replays", "none"]))
+"""
+
+
+def test_installed_wheel_makes_the_report_of_its_own_results(installed, tmp_path):
+    run_python("-c", REPORT, cwd=tmp_path, PYTHONPATH=str(installed))
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Table 1: quality and diversity" in page
+    assert "Outlines of go2 and a1" in page
 
 
 def test_gymnasium_finds_the_environment_of_the_installed_wheel(installed, tmp_path):

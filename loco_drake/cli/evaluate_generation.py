@@ -19,6 +19,7 @@ from loco_drake.cli.output import (
     print_table,
     write_json,
 )
+from loco_drake.cli.trained_on import trained_on
 from loco_drake.datasets.registry import data_dir
 from loco_drake.errors import InputError, check_at_least
 from loco_drake.evaluation.generation import Generated, GenerationScore
@@ -122,16 +123,21 @@ class EvaluateGeneration:
             names = self.labels or tuple(map(str, LABELS))
             other = self._other(folder, model, say)
             score, generated = score_model(model, names, recorded, other, effort, say)
+            paths = {"tokenizer": self._tokenizer(), "generator": self._generator()}
+            seen = trained_on(paths, recorded, name)
+            score.figures["validation_trained_on"] = seen
         if self.figures is not None:
             self._draw(robot, recorded, generated, score)
         return score.figures
 
     def _model(self, name: str) -> MotionModel:
-        return load_motion_model(
-            self.tokenizer or pretrained_path("tokenizer"),
-            self.generator or pretrained_path("generator"),
-            name,
-        )
+        return load_motion_model(self._tokenizer(), self._generator(), name)
+
+    def _tokenizer(self) -> Path:
+        return self.tokenizer or pretrained_path("tokenizer")
+
+    def _generator(self) -> Path:
+        return self.generator or pretrained_path("generator")
 
     def _other(
         self, folder: Path, model: MotionModel, say: Callable[[str], None]

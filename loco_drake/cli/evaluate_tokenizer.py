@@ -10,6 +10,7 @@ from loco_drake.cli.evaluation import (
     write_figure,
 )
 from loco_drake.cli.output import print_failed, print_table, write_json
+from loco_drake.cli.trained_on import trained_on
 from loco_drake.datasets.registry import data_dir
 from loco_drake.errors import InputError, check_at_least
 from loco_drake.evaluation.generation_pictures import code_use_figure
@@ -89,12 +90,14 @@ class EvaluateTokenizer:
             folder, get_robot(name), self.labels, self.workers
         )
         print_failed(recorded.failed.items())
+        path = self.tokenizer or pretrained_path("tokenizer")
+        seen = trained_on({"tokenizer": path}, recorded, name)
         figures, counts = evaluate_tokenizer(tokenizer, recorded, self.books)
         if self.figures is not None:
             title = f"{name}: {figures['codebook_use']:.0%} of the codes are used"
             path = self.figures / f"{name}-codes.png"
             write_figure(code_use_figure(counts, title), path)
-        return figures
+        return {**figures, "validation_trained_on": seen}
 
 
 def _print(name: str, result: dict[str, Any]) -> None:

@@ -1,6 +1,6 @@
 """The command ``evaluate tracking``."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ from loco_drake.systems.scenario import (
     Scenario,
     TrainedPolicy,
 )
+from loco_drake.tracking.randomization import RandomizationConfig
 
 
 @dataclass(kw_only=True)
@@ -57,6 +58,17 @@ class EvaluateTracking:
     """Of cenic, which controls its error."""
     friction: float = 0.8
     """Friction of the ground."""
+    pushes: bool = False
+    """Push the trunk again and again, in directions drawn by the seed."""
+    push_size: float = 1.0
+    """With --pushes: the velocity that each would give the robot as a whole, m/s; its
+    mass times that is the impulse, spread over .1 s."""
+    push_interval: float = 2.0
+    """With --pushes: s from the start to the first, and from each to the next."""
+    randomize: bool = False
+    """Draw the world of each episode, as in training with --randomize."""
+    randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
+    """Single parts of it; a range is two numbers."""
     data_dir: Path | None = None
     """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
     workers: int = 1
@@ -76,19 +88,38 @@ class EvaluateTracking:
         check_choice("reference", self.reference, ("generated", "retargeted"))
         check_duration(self.duration)
         check_at_least("seeds", self.seeds, 1)
+        randomization = self._randomization()
         names = list(ROBOTS) if self.robot == "all" else [self.robot]
         plans = {name: self._plan(name) for name in names}
-        results = {name: self._evaluate(name, *plan) for name, plan in plans.items()}
+        results = {
+            name: self._evaluate(name, *plan, randomization)
+            for name, plan in plans.items()
+        }
         whole = results.get(self.robot, {"robots": results})
         write_json(self.json, whole)
         for name, result in results.items():
+            world = "" if randomization.is_off else ", randomized"
             title = (
-                f"{name}, {self.reference}, {self.contact}: "
+                f"{name}, {self.reference}, {self.contact}{world}: "
                 f"{result['real_time_factor']:.1f} times real time"
             )
             rows = {**result["labels"], "all of these": result["all"]}
             print_figures(title, "label", _COLUMNS, rows)
         return 0
+
+    def _randomization(self) -> RandomizationConfig:
+        """Returns what the worlds are drawn from."""
+        result = self.randomization
+        if self.pushes:
+            result = replace(
+                result,
+                push=(self.push_size, self.push_size),
+                push_interval=(self.push_interval, self.push_interval),
+            )
+        if self.randomize:
+            result = result.with_standard()
+        result.check()
+        return result
 
     def _plan(self, name: str) -> tuple[Scenario, list[Trial]]:
         """Returns what to simulate for a robot."""
@@ -117,12 +148,16 @@ class EvaluateTracking:
         return scenario, generated_trials(labels, seeds, self.duration)
 
     def _evaluate(
-        self, name: str, scenario: Scenario, trials: list[Trial]
+        self,
+        name: str,
+        scenario: Scenario,
+        trials: list[Trial],
+        randomization: RandomizationConfig,
     ) -> dict[str, Any]:
         with Progress(console=Console(stderr=True), transient=True) as progress:
             episodes = list(
                 progress.track(
-                    run_trials(scenario, trials, self.workers),
+                    run_trials(scenario, trials, self.workers, randomization),
                     total=len(trials),
                     description=f"Simulating {name}",
                 )
@@ -134,6 +169,7 @@ class EvaluateTracking:
             "time_step_s": self.time_step,
             "friction": self.friction,
             "duration_s": self.duration,
+            "randomization": asdict(randomization),
         }
         return {**conditions, **summarize(episodes)}
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.errors import InputError, check_at_least, check_choice
-from loco_drake.gaits import parse_label
+from loco_drake.gait_schedule import parse_schedule
 from loco_drake.generation.generate import (
     check_duration,
     check_sampling,
@@ -25,7 +25,8 @@ class Generate:
     """Generates motions and writes them as Motion files, at 50 frames/s."""
 
     gait: str = "dog-trot"
-    """Gait label SOURCE-GAIT, such as dog-pace."""
+    """Gait label SOURCE-GAIT, such as dog-pace; or several, the later ones with the
+    time in s at which they begin: dog-pace,dog-trot@3,dog-gallop@6."""
     duration: float = 10.0
     """Length of each motion in s, above 0 and at most 600."""
     count: int = 1
@@ -53,8 +54,9 @@ class Generate:
         Raises:
             InputError: if an option is wrong.
         """
-        label = parse_label(self.gait)
+        schedule = parse_schedule(self.gait)
         check_duration(self.duration)
+        schedule.check_ends_by(self.duration)
         check_sampling(self.temperature, self.top_p)
         check_choice("robot", self.robot, ROBOTS)
         check_at_least("count", self.count, 1)
@@ -71,7 +73,7 @@ class Generate:
             start = time.perf_counter()
             motions = generate_motions(
                 model,
-                label,
+                schedule,
                 self.duration,
                 seeds,
                 temperature=self.temperature,
@@ -79,7 +81,7 @@ class Generate:
             )
             seconds += time.perf_counter() - start
             for seed, motion in zip(seeds, motions, strict=True):
-                save_motion(motion, self.out / f"{label}-{seed}.npz")
+                save_motion(motion, self.out / f"{schedule}-{seed}.npz")
                 frames += len(motion)
         figures = {
             "count": self.count,

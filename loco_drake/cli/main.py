@@ -53,6 +53,7 @@ _COMMANDS = {
         "EvaluateTracking",
         "how well the policy follows its references",
     ),
+    "report": ("report", "Report", "one page of all results, beside the paper's"),
 }
 _HELP = ("-h", "--help")
 

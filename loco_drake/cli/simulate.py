@@ -8,14 +8,15 @@ from typing import Annotated
 
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 from pydrake.geometry import Meshcat, MeshcatParams
 
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.errors import InputError
+from loco_drake.evaluation.replay import FRAMES_PER_SECOND, dress, frame
 from loco_drake.evaluation.rollout import Recorder
 from loco_drake.evaluation.tracking import tracking_metrics
 from loco_drake.files import atomic_path
+from loco_drake.gait_schedule import parse_schedule
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import Motion, load_motion
@@ -37,7 +38,8 @@ class Simulate:
     robot: str = "go2"
     """Robot: go2 or a1."""
     gait: str = "dog-trot"
-    """Gait label, source-gait, such as dog-trot; ignored with a Motion file."""
+    """Gait label, source-gait, such as dog-trot; or several, the later ones with the
+    time in s at which they begin: dog-pace,dog-trot@3. Ignored with a Motion file."""
     duration: float = 10.0
     """Seconds to simulate; of a Motion file at most its length."""
     seed: int = 0
@@ -69,7 +71,7 @@ class Simulate:
         recorder = Recorder(scenario, meshcat)
         recorder.start()
         if meshcat is not None:
-            meshcat.StartRecording(frames_per_second=32.0)
+            meshcat.StartRecording(frames_per_second=FRAMES_PER_SECOND)
         duration = self.duration
         if motion is not None:
             duration = min(duration, motion.duration)
@@ -97,7 +99,7 @@ class Simulate:
         if meshcat is not None:
             meshcat.StopRecording()
             meshcat.PublishRecording()
-            _frame(meshcat, rollout.state[:, 4:7])
+            frame(meshcat, rollout.state[:, 4:7])
             if self.html is not None:
                 with atomic_path(self.html) as temporary:
                     temporary.write_text(meshcat.StaticHtml())
@@ -116,6 +118,7 @@ class Simulate:
         if self.duration < PLAN_DT:
             raise InputError(f"The duration must be at least {PLAN_DT} s.")
         if self.reference == "gpt":
+            parse_schedule(self.gait).check_ends_by(self.duration)
             return None
         if not Path(self.reference).is_file():
             raise InputError(
@@ -153,11 +156,7 @@ class Simulate:
         if not self.meshcat and self.html is None:
             return None
         meshcat = _open_meshcat(self.port)
-        meshcat.SetProperty("/Background", "top_color", [0.75, 0.83, 0.92])
-        # These would be drawn through the floor.
-        meshcat.SetProperty("/Grid", "visible", False)
-        meshcat.SetProperty("/Axes", "visible", False)
-        meshcat.SetCameraPose([1.5, -2.5, 1.0], [1.0, 0.0, 0.3])
+        dress(meshcat)
         if self.meshcat:
             print(f"Meshcat: {meshcat.web_url()}", flush=True)
         return meshcat
@@ -174,17 +173,6 @@ def _open_meshcat(port: int | None) -> Meshcat:
     except RuntimeError:
         print(f"Port {port} is in use; Meshcat takes a free one.", file=sys.stderr)
         return Meshcat()
-
-
-def _frame(meshcat: Meshcat, p_WB: NDArray[np.float64]) -> None:
-    """Puts the camera where all of the base's path, shape (N, 3), can be seen."""
-    middle = (p_WB.min(axis=0) + p_WB.max(axis=0)) / 2
-    along = p_WB[-1, :2] - p_WB[0, :2]
-    length = float(np.hypot(*along))
-    side = np.array([along[1], -along[0]]) / max(length, 1e-9)
-    away = max(1.8, 0.6 * length)
-    eye = [*(middle[:2] + away * side), 0.3 + 0.4 * away]
-    meshcat.SetCameraPose(eye, [*middle[:2], 0.25])
 
 
 def _print(figures: dict[str, object]) -> None:

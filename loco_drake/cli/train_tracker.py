@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import torch
+import tyro
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -20,6 +22,7 @@ from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.ppo import PpoConfig
+from loco_drake.tracking.randomization import RandomizationConfig
 from loco_drake.tracking.references import load_references
 from loco_drake.tracking.train import Progress as TrainingProgress
 from loco_drake.tracking.train import TrainingConfig, train_tracker
@@ -48,6 +51,16 @@ class TrainTracker:
     """Environment steps between updates; what is saved lags no more behind."""
     plant: PlantConfig = field(default_factory=PlantConfig)
     """Contact solver, time step and friction."""
+    randomize: bool = False
+    """Draw friction, masses, motors, latency, pushes and noise anew for each episode:
+    every part of --randomization that is not given gets its standard range."""
+    randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
+    """Single parts of it; a range is two numbers."""
+    privileged: bool = True
+    """Whether the policy sees where in the world the base is and how fast it moves,
+    which a robot outside simulation does not know well."""
+    start_from: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """A checkpoint.safetensors, of any robot, with the networks to begin with."""
     seed: int = 0
     """Of everything random."""
     resume: bool = False
@@ -68,15 +81,26 @@ class TrainTracker:
                 f"{environments} environments, not {self.batch}."
             )
         self.plant.check()
+        randomization = self.randomization
+        if self.randomize:
+            randomization = randomization.with_standard()
+        randomization.check()
+        environment = EnvironmentConfig(
+            robot=self.robot, plant=self.plant, randomization=randomization
+        )
+        if not self.privileged:
+            environment = environment.without_position()
         plans = load_references(robot, self.references)
         config = TrainingConfig(
             steps=self.steps,
             workers=self.workers,
             per_worker=self.per_worker,
             seed=self.seed,
-            environment=EnvironmentConfig(robot=self.robot, plant=self.plant),
+            environment=environment,
             ppo=PpoConfig(
-                batch=self.batch, minibatch=min(self.batch, PpoConfig.minibatch)
+                batch=self.batch,
+                minibatch=min(self.batch, PpoConfig.minibatch),
+                privileged=self.privileged,
             ),
         )
         # A second thread gains little, and spins where another program has its core.
@@ -96,7 +120,12 @@ class TrainTracker:
                 bar.update(task, completed=progress.steps, score=score)
 
             figures = train_tracker(
-                plans, config, self.out, resume=self.resume, report=report
+                plans,
+                config,
+                self.out,
+                resume=self.resume,
+                first=self.start_from,
+                report=report,
             )
         write_json(self.json, figures)
         rows = [(label, f"{score:.1f}") for label, score in figures["scores"].items()]

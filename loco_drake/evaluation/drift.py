@@ -1,9 +1,10 @@
 """Does motion of a minute end as it began?
 
-The last 10 s of each motion are compared with its first 10 s in four figures:
+The last 10 s of each motion are compared with its first 10 s in five figures:
 
 speed            of the base along its heading, m/s
 height           mean of the base's, m
+turn rate        change of the heading over the 10 s, rad/s
 stride period    see :mod:`loco_drake.gait_timing`, s
 slip             median speed of the toes in stance, m/s
 
@@ -15,6 +16,12 @@ worst figure of its worst gait: 1 or less means that the last 10 s differ from t
 no more than two samples from each other. (By chance alone a figure of a generator that
 does not drift gets about .35.) A rhythm that is lost on the way counts as a change of
 the period by itself.
+
+Whether a motion turns or sinks more than those that it was learned from is told by
+:func:`beyond_recorded`: how much the heading changes within 2 s in the last 10 s, root
+mean square, over that of recordings, or .04 rad; and how much the height changes from
+first to last 10 s, over what 95 % of pairs of recordings of 2 s differ by at most, or
+1 mm.
 """
 
 from collections.abc import Sequence
@@ -28,6 +35,8 @@ from loco_drake.gait_timing import motion_track, stride_period
 from loco_drake.models.robots import Robot
 from loco_drake.motion import Motion
 from loco_drake.motion_quality import stance_slip_median, toe_trajectories
+from loco_drake.retargeting.trajectories import trajectories
+from loco_drake.rotations import yaw_of
 
 Array = NDArray[np.float64]
 
@@ -37,6 +46,7 @@ WINDOW = 10.0
 RESOLUTION = {
     "speed_mps": 0.01,
     "height_m": 0.001,
+    "turn_rate_radps": 0.02,
     "stride_period_s": 0.005,
     "stance_slip_median_mps": 0.005,
 }
@@ -84,6 +94,50 @@ def drift(robot: Robot, motions: Sequence[Motion]) -> dict[str, Any]:
     return result
 
 
+def beyond_recorded(
+    motions: Sequence[Motion], recorded: Sequence[Motion]
+) -> dict[str, float]:
+    """Returns change of heading and height against those of recordings; see above.
+
+    Args:
+        motions: of one gait, longer than 2 WINDOW.
+        recorded: whole stretches of that gait, at least one of which is 2 s long.
+
+    Returns:
+        ``turn_2s_rad`` and ``recorded_turn_2s_rad``; ``turn_over_recorded``;
+        ``height_over_recorded``. The ratios are 1 or less if there is no more of it
+        than in recordings.
+    """
+    window = round(WINDOW * motions[0].fps)
+    ends = [m.slice(len(m) - window, len(m)) for m in motions]
+    cuts = [part for motion in recorded for part in trajectories(motion)]
+    turn, usual = (
+        float(np.sqrt(np.mean([_turn(part) ** 2 for part in side])))
+        for side in ([part for end in ends for part in trajectories(end)], cuts)
+    )
+    least = RESOLUTION["turn_rate_radps"] * cuts[0].duration
+    first, last, heights = (
+        np.array([m.base_position[:, 2].mean() for m in side])
+        for side in ([m.slice(0, window) for m in motions], ends, cuts)
+    )
+    apart = np.abs(heights[:, None] - heights)[np.triu_indices(len(heights), k=1)]
+    tolerance = max(
+        RESOLUTION["height_m"], float(np.quantile(apart, 0.95)) if len(apart) else 0.0
+    )
+    return {
+        "turn_2s_rad": turn,
+        "recorded_turn_2s_rad": usual,
+        "turn_over_recorded": turn / max(usual, least),
+        "height_over_recorded": float(np.median(np.abs(last - first))) / tolerance,
+    }
+
+
+def _turn(motion: Motion) -> float:
+    """Returns the change of the heading from first to last frame, rad."""
+    yaw = np.unwrap(yaw_of(motion.base_quaternion))
+    return float(yaw[-1] - yaw[0])
+
+
 def worst(drifts: dict[str, dict[str, Any]]) -> dict[str, Any] | None:
     """Returns label, figure and drift of the worst; None if nothing was measured.
 
@@ -112,6 +166,7 @@ def _table(robot: Robot, windows: Sequence[Motion]) -> Array:
             [
                 mean_speed(robot, motion),
                 float(motion.base_position[:, 2].mean()),
+                _turn(motion) / motion.duration,
                 stride_period(motion_track(motion, robot)),
                 slip,
             ]

@@ -22,6 +22,7 @@ from loco_drake.evaluation.recognition import (
 )
 from loco_drake.evaluation.recorded import Recorded
 from loco_drake.evaluation.samples import (
+    FRAMES,
     SUMMARY,
     Samples,
     join,
@@ -127,7 +128,7 @@ def score_generation(
             **_two_sample(of_train, of_validation, join(of_sets), list(seeds)),
             **_frechet(recognition["transformer"], of_train, of_validation, of_sets),
             **_nearest(train, cut_train, cut_validation, sets),
-            **_drift(robot, generated.long),
+            **_drift(robot, generated.long, recorded),
             **_by_label(robot, recorded, generated),
             "reason": {},
         }
@@ -246,16 +247,27 @@ def _nearest(
     }
 
 
-def _drift(robot: Robot, long: dict[str, list[Motion]]) -> dict[str, Any]:
+def _drift(
+    robot: Robot, long: dict[str, list[Motion]], recorded: Recorded
+) -> dict[str, Any]:
     drifts = {
         label: drifting.drift(robot, motions)
         for label, motions in long.items()
         if len(motions) > 1
     }
     worst = drifting.worst(drifts)
+    beyond = {}
+    for label in drifts:
+        real = [
+            motion
+            for motion in (*recorded.train, *recorded.validation)
+            if str(motion.label) == label and len(motion) >= FRAMES
+        ]
+        if real:
+            beyond[label] = drifting.beyond_recorded(long[label], real)
     return {
         "drift_60s": None if worst is None else worst["drift"],
-        "drift": {"worst": worst, "labels": drifts},
+        "drift": {"worst": worst, "labels": drifts, "beyond_recorded": beyond},
     }
 
 

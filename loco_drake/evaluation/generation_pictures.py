@@ -73,7 +73,7 @@ def code_use_figure(counts: NDArray[np.int64], title: str) -> Figure:
         axes.plot(np.arange(1, len(used) + 1), share, color=color, label=label)
     axes.set(xlabel="code, by use", ylabel="share of the book's use", title=title)
     axes.set_yscale("log")
-    axes.legend()
+    axes.legend(ncols=3, loc="lower left", fontsize="small")
     return figure
 
 
@@ -99,13 +99,28 @@ def motion_figure(
             (row[0], "recorded", first_recorded[name]),
             (row[1], "generated", first_generated[name]),
         ):
-            _strip(cell, robot, motion)
+            draw_strip(cell, robot, motion)
             cell.set_title(f"{name}, {what}", size=9)
     return figure
 
 
-def _strip(axes: Axes, robot: Robot, motion: Motion) -> None:
-    """Draws poses side by side, as seen from the left, x forward."""
+def draw_strip(
+    axes: Axes,
+    robot: Robot,
+    motion: Motion,
+    *,
+    near: tuple[str, str] = ("C0", "C1"),
+    ink: str = "k",
+) -> None:
+    """Draws poses side by side, as seen from the left, x forward.
+
+    Args:
+        axes: to draw in.
+        robot: whose outline it is.
+        motion: its first STRIP_SECONDS are shown.
+        near: colours of the left legs, front and rear; the right ones are grey.
+        ink: colour of the trunk.
+    """
     frames = np.linspace(0, STRIP_SECONDS * motion.fps, POSES).round().astype(int)
     frames = np.minimum(frames, len(motion) - 1)
     # A leg whose calf has no length ends at its knee.
@@ -121,11 +136,11 @@ def _strip(axes: Axes, robot: Robot, motion: Motion) -> None:
     ]
     for place, (hip, knee, toe) in enumerate(zip(*legs, strict=True)):
         shift = np.array([place * SPACING, 0.0])
-        for leg, color in ((1, "0.7"), (3, "0.7"), (0, "C0"), (2, "C1")):
+        for leg, color in ((1, "0.7"), (3, "0.7"), (0, near[0]), (2, near[1])):
             line = np.stack((hip[leg], knee[leg], toe[leg])) + shift
             axes.plot(*line.T, color=color, lw=1.5)
         trunk = np.stack((hip[:2].mean(axis=0), hip[2:].mean(axis=0))) + shift
-        axes.plot(*trunk.T, color="k", lw=2)
+        axes.plot(*trunk.T, color=ink, lw=2)
     axes.axhline(0.0, color="0.5", lw=0.8)
     axes.set_aspect("equal")
     axes.axis("off")

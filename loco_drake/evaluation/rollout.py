@@ -13,6 +13,7 @@ from loco_drake.evaluation.tracking import Rollout
 from loco_drake.models.plant import ConfigureSimulator
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
+from loco_drake.systems.domain import Domain, SetDomain
 from loco_drake.systems.fall import has_fallen
 from loco_drake.systems.plan import PLAN_DT, Plan
 from loco_drake.systems.scenario import Scenario
@@ -51,7 +52,12 @@ class Recorder:
         return self.simulator.get_mutable_context()
 
     def start(
-        self, *, gait: str | None = None, seed: int = 0, plan: Plan | None = None
+        self,
+        *,
+        gait: str | None = None,
+        seed: int = 0,
+        plan: Plan | None = None,
+        domain: Domain | None = None,
     ) -> None:
         """Puts the clock to 0, the robot on its plan and forgets what was recorded.
 
@@ -59,11 +65,15 @@ class Recorder:
             gait: of a generated reference, instead of the scenario's.
             seed: of a generated reference, used with ``gait``.
             plan: of a reference that is played, instead of the scenario's.
+            domain: in what the world differs from the model; the scenario must have the
+                disturbances for it.
         """
         self._fell = False
         self.simulator.clear_monitor()
         self.diagram.SetDefaultContext(self.context)
         self.context.SetTime(0.0)
+        if domain is not None:
+            SetDomain(self.diagram, self.context, domain)
         reference = self.diagram.GetSubsystemByName("reference")
         context = reference.GetMyMutableContextFromRoot(self.context)
         if gait is not None:

@@ -1,6 +1,8 @@
 """How well a policy tracks many references, label by label.
 
-An episode's figures are those of :mod:`loco_drake.evaluation.tracking`. A label's are
+An episode's figures are those of :mod:`loco_drake.evaluation.tracking`. Its world is
+that of the model, or is drawn for its label and seed from a
+:class:`loco_drake.tracking.randomization.RandomizationConfig`. A label's figures are
 made of its episodes':
 
 ======================== ==============================================================
@@ -16,7 +18,7 @@ real_time_factor         simulated over wall seconds inside AdvanceTo, warm
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -31,11 +33,13 @@ from loco_drake.evaluation.tracking import (
     slip_speeds,
     tracking_metrics,
 )
+from loco_drake.gaits import parse_label
 from loco_drake.models.robots import get_robot
 from loco_drake.parallel import map_in_workers
 from loco_drake.retargeting.batch import SegmentRetargeter
 from loco_drake.systems.plan import PLAN_DT, plan_from_motion
 from loco_drake.systems.scenario import PlanReference, Scenario
+from loco_drake.tracking.randomization import RandomizationConfig
 
 _POOLED = ("joint_rmse_rad", "base_position_rmse_m", "base_orientation_rmse_rad")
 _MEANS = (
@@ -88,8 +92,9 @@ class Episode:
 class _Runner:
     """Simulates one trial after the other in one diagram."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, randomization: RandomizationConfig) -> None:
         self._robot = get_robot(scenario.robot)
+        self._randomization = randomization
         self._recorder = Recorder(scenario)
         self._retargeter: SegmentRetargeter | None = None
         # The first step sets up torch.
@@ -98,12 +103,14 @@ class _Runner:
 
     def __call__(self, trial: Trial) -> Episode:
         duration = trial.duration
+        random = np.random.default_rng((trial.seed, parse_label(trial.label).index))
+        domain = self._randomization.draw(self._robot, random, 0.0, duration)
         if trial.segment is None:
-            self._recorder.start(gait=trial.label, seed=trial.seed)
+            self._recorder.start(gait=trial.label, seed=trial.seed, domain=domain)
         else:
             plan = self._plan(trial.segment)
             duration = min(duration, plan.end_time)
-            self._recorder.start(plan=plan)
+            self._recorder.start(plan=plan, domain=domain)
         rollout, wall = self._recorder.run(duration)
         return Episode(
             trial=trial,
@@ -151,7 +158,10 @@ def retargeted_trials(
 
 
 def run_trials(
-    scenario: Scenario, trials: Sequence[Trial], workers: int = 1
+    scenario: Scenario,
+    trials: Sequence[Trial],
+    workers: int = 1,
+    randomization: RandomizationConfig | None = None,
 ) -> Iterator[Episode]:
     """Simulates trials, and yields what came of each, in their order.
 
@@ -160,11 +170,15 @@ def run_trials(
             segments.
         trials: all of one kind.
         workers: processes.
+        randomization: what each trial's world is drawn from, by its label and seed.
     """
+    randomization = randomization or RandomizationConfig()
+    randomization.check()
+    scenario = replace(scenario, disturbances=randomization.disturbances)
     recorded = isinstance(scenario.reference, PlanReference)
     if any((trial.segment is not None) != recorded for trial in trials):
         raise ValueError("the trials are not of the scenario's kind of reference")
-    return map_in_workers(partial(_Runner, scenario), trials, workers)
+    return map_in_workers(partial(_Runner, scenario, randomization), trials, workers)
 
 
 def summarize(episodes: Sequence[Episode]) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from loco_drake.rotations import quat_conjugate, quat_rotate
 Array = NDArray[np.float64]
 
 BASE_GAIN = 0.05  # share of the standing feet's mean offset that the base takes over
+BASE_EASE = 0.15  # share of that shift's change that is made in a frame: no jolts
 SWING_DECAY = 0.8  # of a swinging foot's offset, a frame
 SETTLING = 0.5  # share of its height over the ground that a standing foot loses
 REACH = 0.06  # m, a foot that would have to be moved farther slides
@@ -33,12 +34,14 @@ class Footing:
 
     Attributes:
         pose: x, y in m and yaw in rad of the base, shape (B, 3).
+        shift: by how much the feet moved the base in the frame, m, shape (B, 2).
         anchor: where each foot landed, x and y in m, shape (B, 4, 2).
         offset: by how much each toe is moved in W, in m, shape (B, 4, 3).
         contacts: which feet stand, shape (B, 4).
     """
 
     pose: Array
+    shift: Array
     anchor: Array
     offset: Array
     contacts: NDArray[np.bool_]
@@ -49,6 +52,7 @@ def start_footing(pose: Array) -> Footing:
     batch = len(pose)
     return Footing(
         pose=pose,
+        shift=np.zeros((batch, 2)),
         anchor=np.zeros((batch, 4, 2)),
         offset=np.zeros((batch, 4, 3)),
         contacts=np.zeros((batch, 4), dtype=np.bool_),
@@ -70,8 +74,9 @@ def step_footing(
         (B, T, 19); contacts, shape (B, T, 4).
     """
     frames = features.shape[1]
-    pose, anchor, offset, down = (
+    pose, shift, anchor, offset, down = (
         footing.pose,
+        footing.shift,
         footing.anchor,
         footing.offset,
         footing.contacts,
@@ -94,7 +99,8 @@ def step_footing(
         held = wanted * np.minimum(1.0, REACH / np.maximum(size, REACH))
         # The base goes where the standing feet on average say that it is.
         weight = down[..., None] / np.maximum(down.sum(axis=1), 1)[:, None, None]
-        shift = BASE_GAIN * (held * weight).sum(axis=1)
+        wish = BASE_GAIN * (held * weight).sum(axis=1)
+        shift = shift + BASE_EASE * (wish - shift)
         xy, toes = xy + shift, toes + shift[:, None]
         faded = SWING_DECAY * offset
         level = offset[..., 2] + SETTLING * (
@@ -110,7 +116,7 @@ def step_footing(
         poses.append(pose)
         offsets.append(offset)
         contacts.append(down)
-    after = Footing(pose, anchor, offset, down)
+    after = Footing(pose, shift, anchor, offset, down)
     q = positions(robot, features, np.stack(poses, axis=1))
     moved = np.stack(offsets, axis=1)
     return after, _move_toes(robot, q, moved), np.stack(contacts, axis=1)
@@ -125,10 +131,24 @@ def _toes(robot: Robot, features: Array) -> Array:
 
 
 def _move_toes(robot: Robot, q: Array, offset: Array) -> Array:
-    """Returns q with the toes moved by ``offset`` in W, and none below the ground."""
+    """Returns q with the toes moved by ``offset`` in W, and none below the ground.
+
+    Where a leg cannot be folded far enough for that, the base is raised.
+    """
     q_WB, p_WB = q[..., None, :4], q[..., None, 4:7]
     p_WF = quat_rotate(q_WB, toe_positions(robot, q[..., 7:])) + p_WB + offset
     p_WF[..., 2] = np.maximum(p_WF[..., 2], robot.foot_radius)
+    joints, reached = _reach(robot, q_WB, p_WB, p_WF)
+    sunk = np.maximum(robot.foot_radius - reached[..., 2], 0.0).max(axis=-1)
+    raised = q[..., :7].copy()
+    raised[..., 6] += sunk
+    if sunk.any():
+        joints, _ = _reach(robot, q_WB, raised[..., None, 4:], p_WF)
+    return np.concatenate((raised, joints), axis=-1)
+
+
+def _reach(robot: Robot, q_WB: Array, p_WB: Array, p_WF: Array) -> tuple[Array, Array]:
+    """Returns joints within their limits, and where the toes are then."""
     joints = leg_joints(robot, quat_rotate(quat_conjugate(q_WB), p_WF - p_WB))
     joints = np.clip(joints, robot.joint_lower, robot.joint_upper)
-    return np.concatenate((q[..., :7], joints), axis=-1)
+    return joints, quat_rotate(q_WB, toe_positions(robot, joints)) + p_WB

@@ -3,18 +3,24 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from loco_drake.errors import InputError
+from loco_drake.gait_schedule import GaitSchedule
 from loco_drake.gaits import GaitLabel
 from loco_drake.generation.motion_model import MotionModel
 from loco_drake.motion import FPS, Motion
 
+Integers = NDArray[np.int64]
+
+# Label of a motion that changes its gait on the way.
+SEVERAL = GaitLabel("several", "gaits")
 LONGEST_DURATION = 600.0  # s
 
 
 def generate_motions(
     model: MotionModel,
-    label: GaitLabel,
+    gait: GaitLabel | GaitSchedule,
     duration: float,
     seeds: Sequence[int],
     *,
@@ -25,7 +31,8 @@ def generate_motions(
 
     Args:
         model: from :mod:`loco_drake.generation.pretrained` or one's own training.
-        label: one that the generator was trained on.
+        gait: one that the generator was trained on, or several after each other.
+            The motion's label is then SEVERAL; its provenance says which.
         duration: from first to last frame, in s, at most LONGEST_DURATION.
         seeds: not negative; each motion depends on its own only.
         temperature: see :meth:`MotionModel.extend`.
@@ -36,13 +43,16 @@ def generate_motions(
     """
     check_duration(duration)
     check_sampling(temperature, top_p)
+    schedule = GaitSchedule((gait,)) if isinstance(gait, GaitLabel) else gait
+    schedule.check_ends_by(duration)
     if any(seed < 0 for seed in seeds):
         raise InputError("Seeds must be 0 or more.")
     count = round(duration * FPS) + 1
     stream = model.start(np.array(seeds), duration)
-    labels = np.full(len(seeds), label.index)
+    label = schedule.labels[0] if len(schedule.labels) == 1 else SEVERAL
     parts = []
-    for _ in range(-(-count // model.chunk_frames)):
+    for chunk in range(-(-count // model.chunk_frames)):
+        labels = np.tile(chunk_labels(model, schedule, chunk), (len(seeds), 1))
         stream, frames = model.extend(
             stream, labels, temperature=temperature, top_p=top_p
         )
@@ -65,7 +75,7 @@ def generate_motions(
             joint_velocities=v[i, :, 6:].copy(),
             contacts=contacts[i].copy(),
             provenance={
-                "generated": f"{label} for {duration:g} s",
+                "generated": f"{schedule} for {duration:g} s",
                 "seed": str(seed),
                 "temperature": f"{temperature:g}",
                 "top_p": f"{top_p:g}",
@@ -74,6 +84,20 @@ def generate_motions(
         )
         for i, seed in enumerate(seeds)
     ]
+
+
+def chunk_labels(model: MotionModel, schedule: GaitSchedule, chunk: int) -> Integers:
+    """Returns the labels of the tokens of a chunk, shape (model.chunk_tokens,).
+
+    A token is of the gait that is due when its first frame is.
+
+    Args:
+        model: writes the chunk.
+        schedule: from time 0 on.
+        chunk: its number, of chunks of the usual length.
+    """
+    tokens = chunk * model.chunk_tokens + np.arange(model.chunk_tokens)
+    return schedule.at(tokens * model.frames_per_token / FPS)
 
 
 def generate_motion(

@@ -93,15 +93,12 @@ class RotaryAttention(nn.Module):
             Output of the shape of ``x``; keys and values of all P + T times.
         """
         batch, time, width = x.shape
-        # (B, T, 3 * width) -> three of (B, heads, T, size)
-        q, k, v = (
-            part.view(batch, time, self.heads, -1).transpose(1, 2)
-            for part in self.qkv(x).chunk(3, dim=-1)
-        )
+        # (B, T, 3 * width) -> (3, B, heads, T, size)
+        qkv = self.qkv(x).view(batch, time, 3, self.heads, -1).permute(2, 0, 3, 1, 4)
         start = 0 if past is None else past[0].shape[2]
         angles = torch.arange(start, start + time)[:, None] * self.rates
-        cos, sin = angles.cos(), angles.sin()
-        q, k = turn_channels(q, cos, sin), turn_channels(k, cos, sin)
+        q, k = turn_channels(qkv[:2], angles.cos(), angles.sin())
+        v = qkv[2]
         if past is not None:
             k, v = torch.cat((past[0], k), dim=2), torch.cat((past[1], v), dim=2)
         if past is not None and time > 1:
@@ -118,6 +115,6 @@ class RotaryAttention(nn.Module):
 
 
 def turn_channels(x: Tensor, cos: Tensor, sin: Tensor) -> Tensor:
-    """Rotates pairs of channels of (B, heads, T, size) by angles (T, size / 2)."""
+    """Rotates pairs of channels of (..., T, size) by angles (T, size / 2)."""
     a, b = x.chunk(2, dim=-1)
     return torch.cat((a * cos - b * sin, a * sin + b * cos), dim=-1)

@@ -113,15 +113,20 @@ def load_library(*folders: Path) -> Library:
 def motion_clip(motion: Motion, path: str = "") -> Clip:
     """Returns a motion as a clip; ``path`` names a recording that has no other name."""
     robot = get_robot(motion.robot)
-    origin = motion.provenance
-    recording = origin.get("animal") or origin.get("recording", path)
     return Clip(
         robot=motion.robot,
         label=motion.label,
-        recording=f"{motion.source}-{recording}",
+        recording=recording_name(motion, path),
         features=motion_features(robot, motion),
         performance=_performance(motion),
     )
+
+
+def recording_name(motion: Motion, path: str = "") -> str:
+    """Returns the source and the recording, or the animal if known, of a motion."""
+    origin = motion.provenance
+    recording = origin.get("animal") or origin.get("recording", path)
+    return f"{motion.source}-{recording}"
 
 
 def _performance(motion: Motion) -> str:

@@ -1,5 +1,6 @@
 """Motion without end, a chunk at a time, from tokenizer and generator."""
 
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -114,6 +115,10 @@ class MotionModel:
             )
         self.tokenizer = tokenizer.eval()
         self.generator = generator.eval()
+        # How motions are batched changes sums in their last bits. In 64 bits that is
+        # too little to draw another code or to lift another foot.
+        self._writer = deepcopy(self.generator).double()
+        self._decoder = deepcopy(self.tokenizer).double()
         self.robot: Robot = get_robot(robot)
         self.frames_per_token = tokenizer.config.frames_per_token
         self.chunk_tokens = round(CHUNK_SECONDS * FPS / self.frames_per_token)
@@ -190,7 +195,7 @@ class MotionModel:
         steps = self.chunk_tokens if tokens is None else tokens
         batch = len(stream.seeds)
         labels = np.asarray(labels, dtype=np.int64)
-        self._check_labels(labels)
+        self.check_labels(labels)
         new = np.broadcast_to(labels.reshape(batch, -1), (batch, steps))
         # The first tokens are only there for the decoder to look back at.
         lead = 0 if stream.chunk else self._lead
@@ -200,7 +205,7 @@ class MotionModel:
         window = self.generator.config.window
         history, given = stream.tokens[:, -window:], stream.labels[:, -window:]
         with single_thread():
-            drawn = self.generator.sample(
+            drawn = self._writer.sample(
                 torch.from_numpy(history.copy()),
                 torch.from_numpy(np.concatenate((given[:, 1:], new), axis=1)),
                 torch.from_numpy(duration_bin(stream.duration)),
@@ -229,11 +234,11 @@ class MotionModel:
         window_labels = np.concatenate((stream.labels, labels), axis=1)
         seen = min(before, self.tokenizer.memory)
         with torch.inference_mode(), single_thread():
-            decoded = self.tokenizer.decode(
+            decoded = self._decoder.decode(
                 torch.from_numpy(window[:, before - seen :]),
                 torch.full((batch,), self._robot_index),
             )
-        features = decoded.numpy()[:, seen * self.frames_per_token :].astype(np.float64)
+        features = decoded.numpy()[:, seen * self.frames_per_token :]
         footing, q, held = stream.footing, stream.q, stream.contacts[:, None]
         if not stream.chunk:
             lead = self._lead * self.frames_per_token
@@ -288,7 +293,8 @@ class MotionModel:
         after, q, contacts = step_footing(self.robot, start_footing(start), features)
         return after, q[:, -2:], contacts[:, -1:]
 
-    def _check_labels(self, labels: Integers) -> None:
+    def check_labels(self, labels: Integers) -> None:
+        """Raises InputError if the weights were not trained on one of ``labels``."""
         unknown = sorted(set(labels.ravel().tolist()) - self._known)
         if unknown:
             names = [str(LABELS[i]) if i < len(LABELS) else str(i) for i in unknown]

@@ -39,8 +39,8 @@ class TokenizerConfig:
     width: int = 128
     depth: int = 3
     frame_width: int = 48
-    code_size: int = 32
-    books: int = 8
+    code_size: int = 48
+    books: int = 12
     book_size: int = 128
 
 

@@ -25,6 +25,7 @@ from loco_drake.generation.stitching import Stitcher
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.tokenizer_score import clip_tensor
 from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.generation.training_record import training_record
 from loco_drake.motion import FPS
 
 BATCH = 24  # windows
@@ -133,7 +134,8 @@ def train_generator(
     }
     result = train("generator", generator, loss_of_batch, settings, run)
     if not result.stopped:
-        info = {"robots": list(library.robots)}
+        record = {**training_record(library, settings), "stitched": stitched}
+        info = {"robots": list(library.robots), "training": record}
         save_generator(generator, Path(settings.out) / "generator.safetensors", info)
     return generator, result
 

@@ -6,7 +6,7 @@ vector-quantize-pytorch. The finest books are left out at random, so that the de
 makes the best of the coarse ones alone.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from loco_drake.generation.library import Clip, Library
 from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
 from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.generation.training_record import training_record
 from loco_drake.generation.windows import WINDOW, PairedWindows
 from loco_drake.models.robots import get_robot
 
@@ -37,6 +38,7 @@ WEIGHTS = {
     "features": 1.0,  # squared error, see Scales
     "changes": 0.25,  # ... of the change from frame to frame
     "jitter": 0.1,  # ... of the change of that
+    "energy": 0.5,  # squared error of the logarithm of the RMS of that in a window
     "toes": 1.0,  # squared error of toe positions, in units of TOE_SCALE
     "toe_speeds": 0.5,  # ... of their velocities over the ground, TOE_SPEED_SCALE
     "contacts": 0.2,  # cross-entropy
@@ -44,6 +46,7 @@ WEIGHTS = {
 }
 LEAST_SHARE = 0.1  # of a label's scale in that of all
 LEAST_SCALES = (0.02, 0.005, 0.002)  # of deviation, change, jitter: rad, stand heights
+QUIET = 0.2  # share of a label's jitter that is taken for none
 TOE_SCALE = 0.05  # m
 TOE_SPEED_SCALE = 0.5  # m/s
 
@@ -134,10 +137,27 @@ class LearningTokenizer(nn.Module):
         return self.tokenizer.eval()
 
 
+def residual_tokenizer(config: TokenizerConfig) -> LearningTokenizer:
+    """Returns the networks, untrained, that are trained by default."""
+    return LearningTokenizer(Tokenizer(config))
+
+
 def train_tokenizer(
-    library: Library, config: TokenizerConfig, settings: LoopSettings
+    library: Library,
+    config: TokenizerConfig,
+    settings: LoopSettings,
+    *,
+    weights: Mapping[str, float] = WEIGHTS,
+    build: Callable[[TokenizerConfig], LearningTokenizer] = residual_tokenizer,
 ) -> tuple[Tokenizer, LoopResult]:
     """Trains a tokenizer and writes ``tokenizer.safetensors`` if it was not stopped.
+
+    Args:
+        library: what to learn from.
+        config: sizes of the networks.
+        settings: of the training.
+        weights: of the losses, by the names in :data:`WEIGHTS`.
+        build: makes the networks.
 
     Raises:
         InputError: if no clip is as long as a window, or a robot of the library is
@@ -151,7 +171,7 @@ def train_tokenizer(
         raise InputError(f"The tokenizer is not to know {', '.join(missing)}.")
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
-        learning = LearningTokenizer(Tokenizer(config))
+        learning = build(config)
     with torch.no_grad():
         # To begin with a still picture: first to unlearn jitter kills most codes.
         learning.tokenizer.decoder_out.weight.mul_(0.01)
@@ -165,15 +185,18 @@ def train_tokenizer(
         target, robot, label = windows(random, BATCH)
         losses = tokenizer_losses(learning, toes, scales(label), target, robot, BATCH)
         total = sum(
-            (WEIGHTS[name] * loss for name, loss in losses.items()), torch.zeros(())
+            (weights[name] * loss for name, loss in losses.items()), torch.zeros(())
         )
         return total, {name: loss.item() for name, loss in losses.items()}
 
-    run = {"network": asdict(config), "weights": WEIGHTS}
+    run = {"network": asdict(config), "weights": dict(weights)}
     result = train("tokenizer", learning, loss_of_batch, settings, run)
     tokenizer = learning.finish()
     if not result.stopped:
-        info = {"labels": [str(label) for label in library.labels]}
+        info = {
+            "labels": [str(label) for label in library.labels],
+            "training": training_record(library, settings),
+        }
         save_tokenizer(tokenizer, Path(settings.out) / "tokenizer.safetensors", info)
     return tokenizer, result
 
@@ -209,6 +232,7 @@ def tokenizer_losses(
         "features": (error / deviation).square().mean(),
         "changes": (error.diff(dim=1) / change).square().mean(),
         "jitter": (error.diff(n=2, dim=1) / jitter).square().mean(),
+        "energy": energy_error(output, target, jitter),
         "toes": ((p_output - p_target) / TOE_SCALE).square().mean(),
         "toe_speeds": ((v_output - v_target) / TOE_SPEED_SCALE).square().mean(),
         "contacts": functional.binary_cross_entropy_with_logits(
@@ -216,3 +240,22 @@ def tokenizer_losses(
         ),
         "commitment": commitment,
     }
+
+
+def energy_error(output: Tensor, target: Tensor, jitter: Tensor) -> Tensor:
+    """Returns by how much windows tremble too little or too much.
+
+    What a token cannot tell of a tremor is its phase. The least squared error is then
+    no tremor at all; here it must be there, in any phase.
+
+    Args:
+        output: features, shape (N, T, SIZE).
+        target: the same.
+        jitter: what is much, see :class:`Scales`.
+    """
+
+    def energy(features: Tensor) -> Tensor:
+        turn = features[..., : CONTACTS.start].diff(n=2, dim=1) / jitter
+        return torch.log(turn.square().mean(dim=1) + QUIET**2) / 2
+
+    return (energy(output) - energy(target)).square().mean()

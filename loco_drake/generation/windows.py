@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 WINDOW = 64  # frames
 TEMPO = 1.15  # windows are played at most this much faster or slower
+# Share of the windows that are frames as they are: in between, jitter is smoothed away.
+EXACT = 0.5
 
 
 class PairedWindows:
@@ -80,6 +82,8 @@ class PairedWindows:
 def draw_cut(frames: int, random: np.random.Generator) -> tuple[float, float]:
     """Returns where in a clip to begin a window, and the tempo to play it at."""
     last = frames - 1
+    if random.random() < EXACT:
+        return float(random.integers(last - WINDOW + 2)), 1.0
     fastest = min(TEMPO, last / (WINDOW - 1))
     tempo = min(TEMPO ** random.uniform(-1, 1), fastest)
     return random.uniform(0, last - tempo * (WINDOW - 1)), tempo

@@ -1,82 +1,21 @@
-"""Many robots that follow plans, simulated one after the other in one Context."""
-
-import math
-from functools import lru_cache
+"""Many robots that follow plans, one control period at a time."""
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Diagram
 
-from loco_drake.models.plant import ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.rotations import quat_to_matrix
-from loco_drake.systems.diagram import MakeLocomotionDiagram
+from loco_drake.systems.domain import Domain
 from loco_drake.systems.joint_targets import joint_targets
 from loco_drake.systems.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.systems.plan import PLAN_DT, Plan
-from loco_drake.systems.scenario import ExternalTargets, Scenario
+from loco_drake.systems.sensors import draw_error, measure
 from loco_drake.systems.tracking_reward import reward_terms
 from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.physics import make_worlds
 from loco_drake.tracking.terminations import is_lost
 
 Array = NDArray[np.float64]
-
-
-@lru_cache(maxsize=4)
-def _diagram(robot: str, contact: str, time_step: float, friction: float) -> Diagram:
-    # One per process: pydrake never frees diagrams with Python systems.
-    plant = PlantConfig(contact=contact, time_step=time_step, friction=friction)
-    return MakeLocomotionDiagram(
-        Scenario(robot=robot, plant=plant, policy=ExternalTargets())
-    )
-
-
-class _Physics:
-    """One control period of a robot, as a function of its state and its targets.
-
-    [q, v] is all the state of the diagram, and the plant does not know the time, so
-    that one Context serves all robots: with one for each, every step would find the
-    caches of the processor filled with those of the others.
-    """
-
-    def __init__(self, config: EnvironmentConfig) -> None:
-        plant = config.plant
-        diagram = _diagram(config.robot, plant.contact, plant.time_step, plant.friction)
-        self._simulator = Simulator(diagram, diagram.CreateDefaultContext())
-        ConfigureSimulator(self._simulator, plant)
-        self._context = self._simulator.get_mutable_context()
-        self._plant = diagram.GetSubsystemByName("plant")
-        self._plant_context = self._plant.GetMyMutableContextFromRoot(self._context)
-        port = diagram.GetInputPort("desired_state")
-        self._desired_state = port.FixValue(self._context, np.zeros(port.size()))
-        # The clock may run on where the steps of the plant meet the control periods to
-        # the last bit, however late it is. An integrator must forget the last robot.
-        steps = PLAN_DT / plant.time_step
-        power_of_2 = steps >= 1 and math.frexp(steps)[0] == 0.5
-        self._runs_on = power_of_2 and plant.contact != "cenic"
-        self._periods = 0
-        self._simulator.Initialize()
-
-    def advance(self, state: Array, desired_state: Array) -> Array:
-        """Returns the state [q, v], (37,), one control period after ``state``.
-
-        Args:
-            state: as what is returned.
-            desired_state: of the PD, [q_d, v_d], shape (24,).
-        """
-        self._plant.SetPositionsAndVelocities(self._plant_context, state)
-        # GetMutableData tells what depends on it that it changes.
-        self._desired_state.GetMutableData().get_mutable_value().set_value(
-            desired_state
-        )
-        if not self._runs_on:
-            self._periods = 0
-            self._context.SetTime(0.0)
-            self._simulator.Initialize()
-        self._periods += 1
-        self._simulator.AdvanceTo(self._periods * PLAN_DT, interruptible=False)
-        return np.asarray(self._plant.GetPositionsAndVelocities(self._plant_context))
 
 
 class TrackingBatch:
@@ -103,7 +42,9 @@ class TrackingBatch:
         self._plans = plans
         self._config = config
         self._robot = get_robot(config.robot)
-        self._physics = _Physics(config)
+        config.randomization.check()
+        self._worlds = make_worlds(config, count)
+        self._domains = [Domain()] * count
         self._lengths = np.array([len(plan) for plan in plans])
         # All samples of all plans, one after the other, for one look-up a step.
         self._first = np.cumsum(self._lengths) - self._lengths
@@ -148,6 +89,11 @@ class TrackingBatch:
         self._state[i] = self._config.reset_noise.draw(wanted, random)
         self._R_WB[i] = quat_to_matrix(self._state[i, :4])
         self._action[i] = 0.0
+        domain = self._config.randomization.draw(
+            self._robot, random, sample * PLAN_DT, self._last[i] * PLAN_DT
+        )
+        self._domains[i] = domain
+        self._worlds[i].begin(domain, sample)
 
     def step(
         self, actions: NDArray[np.floating]
@@ -165,7 +111,7 @@ class TrackingBatch:
         now = self._first[self.plan] + self.sample
         desired_state = joint_targets(self._set_points[now], self._action)
         for i, state in enumerate(self._state):
-            self._state[i] = self._physics.advance(state, desired_state[i])
+            self._state[i] = self._worlds[i].advance(state, desired_state[i])
         wanted, toes = self._wanted[now], self._toes[now]
         self._R_WB = quat_to_matrix(self._state[:, :4])
         terms = reward_terms(self._robot, wanted, toes, self._state, self._R_WB)
@@ -193,11 +139,19 @@ class TrackingBatch:
             contacts=self._contacts[rows],
             label=self._labels[first + sample],
         )
-        observations = observe(
-            self._robot,
-            shown,
-            self._state[robots],
-            self._action[robots],
-            self._R_WB[robots],
-        )
+        state, R_WB = self._measured(robots)
+        observations = observe(self._robot, shown, state, self._action[robots], R_WB)
         return observations.astype(np.float32)
+
+    def _measured(
+        self, robots: NDArray[np.int64] | slice
+    ) -> tuple[Array, Array | None]:
+        """Returns states as robots measure them, and rotation matrices if known."""
+        if self._config.randomization.noise is None:
+            return self._state[robots], self._R_WB[robots]
+        errors = [
+            draw_error(domain.sensors, int(sample))
+            for domain, sample in zip(self._domains, self.sample, strict=True)
+            if domain.sensors is not None
+        ]
+        return measure(self._state[robots], np.array(errors)[robots]), None

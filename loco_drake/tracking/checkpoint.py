@@ -60,6 +60,17 @@ def load_checkpoint(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     return load_weights(path, KIND)
 
 
+def start_from(
+    learner: AdaptivePPO, tensors: dict[str, Tensor], state: dict[str, Any]
+) -> None:
+    """Gives ``learner`` the networks and the normalizer of a checkpoint, no more."""
+    learner.policy.load_state_dict(_part(tensors, "policy"))
+    statistics = learner.statistics
+    statistics.mean = tensors["normalizer/mean"].numpy()
+    statistics.var = tensors["normalizer/variance"].numpy()
+    statistics.count = state["normalizer_count"]
+
+
 def restore(
     learner: AdaptivePPO,
     sampler: PlanSampler,
@@ -67,29 +78,16 @@ def restore(
     state: dict[str, Any],
 ) -> None:
     """Puts ``learner`` and ``sampler`` where the checkpoint left them."""
-
-    def part(name: str) -> dict[str, Tensor]:
-        prefix = f"{name}/"
-        return {
-            key.removeprefix(prefix): value
-            for key, value in tensors.items()
-            if key.startswith(prefix)
-        }
-
-    learner.policy.load_state_dict(part("policy"))
+    start_from(learner, tensors, state)
     moments: dict[int, dict[str, Tensor]] = {}
-    for key, value in part("optimizer").items():
+    for key, value in _part(tensors, "optimizer").items():
         index, name = key.split("/")
         moments.setdefault(int(index), {})[name] = value
     optimizer = learner.policy.optimizer
     groups = optimizer.state_dict()["param_groups"]
     optimizer.load_state_dict({"state": moments, "param_groups": groups})
-    statistics = learner.statistics
-    statistics.mean = part("normalizer")["mean"].numpy()
-    statistics.var = part("normalizer")["variance"].numpy()
-    statistics.count = state["normalizer_count"]
-    sampler.scores[:] = part("sampler")["scores"].numpy()
-    sampler.shares[:] = part("sampler")["shares"].numpy()
+    sampler.scores[:] = tensors["sampler/scores"].numpy()
+    sampler.shares[:] = tensors["sampler/shares"].numpy()
     sampler.random.bit_generator.state = state["sampler_random"]
     torch.set_rng_state(tensors["random/torch"])
     position, has_gauss, gauss = state["numpy_random"]
@@ -97,3 +95,12 @@ def restore(
     np.random.set_state(("MT19937", keys, position, has_gauss, gauss))  # noqa: NPY002
     learner.num_timesteps = state["steps"]
     learner.rate = state["learning_rate"]
+
+
+def _part(tensors: dict[str, Tensor], name: str) -> dict[str, Tensor]:
+    prefix = f"{name}/"
+    return {
+        key.removeprefix(prefix): value
+        for key, value in tensors.items()
+        if key.startswith(prefix)
+    }

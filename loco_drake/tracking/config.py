@@ -1,12 +1,13 @@
 """What a tracking environment is, but for its plans."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.models.plant import PlantConfig
 from loco_drake.rotations import quat_multiply, quat_rotate, yaw_quat
+from loco_drake.tracking.randomization import RandomizationConfig
 from loco_drake.tracking.terminations import TerminationConfig
 
 Array = NDArray[np.float64]
@@ -53,6 +54,7 @@ class EnvironmentConfig:
         termination: when an episode ends early.
         episode_steps: an episode is truncated after this many steps.
         reset_noise: how far from the plan's state episodes start.
+        randomization: in what each episode's world differs from the model.
     """
 
     robot: str = "go2"
@@ -60,3 +62,17 @@ class EnvironmentConfig:
     termination: TerminationConfig = field(default_factory=TerminationConfig)
     episode_steps: int = 200
     reset_noise: ResetNoise = field(default_factory=ResetNoise)
+    randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
+
+    def without_position(self) -> "EnvironmentConfig":
+        """Returns a copy for policies that do not know where in the world they are.
+
+        They cannot help drifting from the plan, so that episodes do not end before
+        1 m of it, which a robot that stands still reaches all the same; and they need
+        not learn to come back from beside it.
+        """
+        return replace(
+            self,
+            termination=replace(self.termination, position=1.0),
+            reset_noise=replace(self.reset_noise, position=0.0),
+        )

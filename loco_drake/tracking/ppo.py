@@ -30,6 +30,8 @@ class PpoConfig:
         critic_rate: learning rate of the critic, which has nothing to diverge from.
         log_std: initial log standard deviation of the actions.
         hidden: widths of the hidden layers of both networks.
+        privileged: whether the actor sees all of the observation, or only what a robot
+            outside simulation knows; the critic sees all.
     """
 
     batch: int = 4096
@@ -43,6 +45,7 @@ class PpoConfig:
     critic_rate: float = 1e-3
     log_std: float = -0.7
     hidden: list[int] = field(default_factory=lambda: [256, 128])
+    privileged: bool = True
 
 
 class ScaleReward(VecEnvWrapper):
@@ -126,6 +129,7 @@ def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
             "net_arch": {"pi": config.hidden, "vf": config.hidden},
             "activation_fn": torch.nn.ELU,
             "log_std_init": config.log_std,
+            "privileged": config.privileged,
         },
         seed=seed,
         device="cpu",

@@ -10,6 +10,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from torch import Tensor
 
+from loco_drake.systems.actor import unprivileged_mask
 from loco_drake.systems.symmetry import mirror_actions, mirror_observations
 
 
@@ -18,7 +19,21 @@ class SymmetricPolicy(ActorCriticPolicy):
 
     The mean action mirrors with the observation, and the value does not change with
     it, exactly. Observations must be normalized by :class:`SymmetricStatistics`.
+
+    Args:
+        *args: as of ActorCriticPolicy.
+        privileged: whether the actor sees all of the observation; the critic, which is
+            needed in training only, always does (Pinto et al. 2018, "Asymmetric actor
+            critic").
+        **kwargs: as of ActorCriticPolicy.
     """
+
+    _mask: Tensor
+
+    def __init__(self, *args: Any, privileged: bool = True, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._privileged = privileged
+        self.register_buffer("_mask", unprivileged_mask(), persistent=False)
 
     def forward(
         self, obs: Any, deterministic: bool = False
@@ -44,9 +59,11 @@ class SymmetricPolicy(ActorCriticPolicy):
         return self._evaluate(obs)[1]
 
     def _evaluate(self, obs: Any) -> tuple[Distribution, Tensor]:
-        latent_pi, latent_vf = self.mlp_extractor(
-            torch.cat((obs, mirror_observations(obs)))
-        )
+        seen = torch.cat((obs, mirror_observations(obs)))
+        latent_vf = self.mlp_extractor.forward_critic(seen)
+        if not self._privileged:
+            seen = seen * self._mask
+        latent_pi = self.mlp_extractor.forward_actor(seen)
         mean, image = self.action_net(latent_pi).chunk(2)
         value, image_value = self.value_net(latent_vf).chunk(2)
         mean = (mean + mirror_actions(image)) / 2

@@ -11,23 +11,29 @@ import numpy as np
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+from torch import Tensor
 
 from loco_drake.errors import InputError
 from loco_drake.gaits import LABELS
 from loco_drake.systems.actor import ActorConfig, save_actor
+from loco_drake.systems.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
 from loco_drake.systems.plan import Plan
 from loco_drake.tracking.checkpoint import (
     load_checkpoint,
     restore,
     save_checkpoint,
+    start_from,
 )
 from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.learning_curve import PROGRESS, learning_curve
 from loco_drake.tracking.ppo import AdaptivePPO, PpoConfig, export_actor, make_ppo
 from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.workers import WorkerVecEnv
 
 CHECKPOINT = "checkpoint.safetensors"
 POLICY = "policy.safetensors"
+
+_LAYOUT = [list(part) for part in OBSERVATION_LAYOUT]
 
 
 @dataclass(kw_only=True)
@@ -72,6 +78,7 @@ def train_tracker(
     folder: Path,
     *,
     resume: bool = False,
+    first: Path | None = None,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> dict[str, Any]:
     """Trains a policy to follow ``plans``.
@@ -81,25 +88,40 @@ def train_tracker(
     ``progress.jsonl`` and TensorBoard logs. An interruption (Ctrl-C), or being killed,
     loses at most the batch being collected.
 
+    Args:
+        plans: what to follow.
+        config: how to train.
+        folder: for the results.
+        resume: go on from the checkpoint in ``folder``.
+        first: a checkpoint of any training, whose networks and normalizer are those to
+            begin with; all else begins anew.
+        report: called after each batch.
+
     Returns:
-        steps, wall_clock_s, interrupted, and the scores by label.
+        steps, wall_clock_s of this run, interrupted, the scores by label, the robot,
+        and the learning curve of all runs (:mod:`.learning_curve`).
 
     Raises:
-        InputError: if there is nothing to resume, or what there is was trained with
-            other networks or for another robot.
+        InputError: if there is nothing to resume or to begin with, or what there is was
+            trained with other networks or observations, or, to resume, for another
+            robot.
         ChildProcessError: if a worker process is killed.
     """
     folder = Path(folder)
-    checkpoint = folder / CHECKPOINT
-    fixed = {"robot": config.environment.robot, "hidden": config.ppo.hidden}
+    fixed = {
+        "robot": config.environment.robot,
+        "hidden": config.ppo.hidden,
+        "privileged": config.ppo.privileged,
+    }
+    config.environment.randomization.check()
+    if resume and first is not None:
+        raise InputError("Give either a checkpoint to start from or resume, not both.")
     tensors, saved = None, None
+    beginning: tuple[dict[str, Tensor], dict[str, Any]] | None = None
     if resume:
-        tensors, header = load_checkpoint(checkpoint)
-        saved = header["state"]
-        if header["config"]["fixed"] != fixed:
-            raise InputError(
-                f"{checkpoint} is of {header['config']['fixed']}, not of {fixed}."
-            )
+        tensors, saved = _load(folder / CHECKPOINT, fixed)
+    if first is not None:
+        beginning = _load(first, {"hidden": config.ppo.hidden})
     folder.mkdir(parents=True, exist_ok=True)
     for unfinished in folder.glob(".*.safetensors"):
         unfinished.unlink()  # what a training was writing when it was killed
@@ -120,6 +142,8 @@ def train_tracker(
         learner = make_ppo(environment, config.ppo, config.seed)
         if tensors is not None and saved is not None:
             restore(learner, sampler, tensors, saved)
+        if beginning is not None:
+            start_from(learner, *beginning)
         learner.set_logger(Logger(None, [TensorBoardOutputFormat(str(folder))]))
         saver = _Saver(folder, sampler, config, fixed, report)
         interrupted = False
@@ -135,12 +159,30 @@ def train_tracker(
         saver.save(learner)
     finally:
         environment.close()
+    log = folder / PROGRESS
     return {
+        "robot": config.environment.robot,
         "steps": learner.num_timesteps,
         "wall_clock_s": time.monotonic() - start,
         "interrupted": interrupted,
         "scores": sampler.score_by_label(),
+        "learning": learning_curve(log) if log.is_file() else None,
     }
+
+
+def _load(
+    checkpoint: Path, fixed: dict[str, Any]
+) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """Returns tensors and state of a checkpoint that agrees with what is ``fixed``."""
+    tensors, header = load_checkpoint(checkpoint)
+    own = {"privileged": True, **header["config"]["fixed"]}
+    own = {name: own[name] for name in fixed}
+    if own != fixed:
+        raise InputError(f"{checkpoint} is of {own}, not of {fixed}.")
+    layout = header["config"].get("observation_layout", _LAYOUT)
+    if layout != _LAYOUT or len(tensors["normalizer/mean"]) != OBSERVATION_SIZE:
+        raise InputError(f"{checkpoint} is of another observation layout.")
+    return tensors, header["state"]
 
 
 class _Saver(BaseCallback):
@@ -190,7 +232,7 @@ class _Saver(BaseCallback):
             if isinstance(value, int | float | np.floating)
         }
         self.logger.dump(self.num_timesteps)
-        with (self._folder / "progress.jsonl").open("a") as log:
+        with (self._folder / PROGRESS).open("a") as log:
             line = {
                 "steps": self.num_timesteps,
                 "seconds": time.monotonic() - self._start,
@@ -206,13 +248,18 @@ class _Saver(BaseCallback):
             self._folder / CHECKPOINT,
             learner,
             self._sampler,
-            {"fixed": self._fixed, "training": asdict(self._config)},
+            {
+                "fixed": self._fixed,
+                "observation_layout": _LAYOUT,
+                "training": asdict(self._config),
+            },
         )
         labels = [str(LABELS[i]) for i in self._sampler.present]
         actor_config = ActorConfig(
             robot=self._config.environment.robot,
             labels=labels,
             hidden=self._config.ppo.hidden,
+            privileged=self._config.ppo.privileged,
         )
         save_actor(export_actor(learner, actor_config), self._folder / POLICY)
 

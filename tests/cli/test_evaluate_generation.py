@@ -105,6 +105,7 @@ def test_a_bad_model_gets_bad_figures(recordings, weights, tmp_path, capsys):
         result["nearest_training_rad"] > 2 * result["nearest_training_rad_validation"]
     )
     assert result["real_time_factor"] > 0
+    assert result["validation_trained_on"] == {"tokenizer": None, "generator": None}
     assert result["drift_60s"] is None
     assert set(result["labels"]) == set(result["confusion"]["labels"]) | {
         name for name, figures in result["labels"].items() if "reason" in figures

@@ -30,9 +30,27 @@ def test_json_has_the_agreed_shape(tmp_path, capsys):
     assert "all of these" in capsys.readouterr().out
 
 
+def test_json_says_what_the_worlds_were_drawn_from(tmp_path, capsys):
+    path = tmp_path / "figures.json"
+    options = "--labels dog-pace --seeds 1 --duration .2 --pushes --push-interval .1"
+    options += " --friction .5 --randomization.payload 1 2 --json"
+    assert main(["evaluate", "tracking", *options.split(), str(path)]) == 0
+    figures = json.loads(path.read_text())
+    assert figures["friction"] == 0.5
+    randomization = figures["randomization"]
+    assert randomization["push"] == [1.0, 1.0]
+    assert randomization["push_interval"] == [0.1, 0.1]
+    assert randomization["payload"] == [1.0, 2.0]
+    assert randomization["friction"] is randomization["noise"] is None
+    assert "similar, randomized" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        ("--pushes --push-size -1", "push must be two numbers"),
+        ("--pushes --push-interval 0", "push_interval must be two numbers"),
+        ("--randomization.latency 0 1", "latency must be two numbers"),
         ("--robot spot", "choices are go2, a1, all"),
         ("--reference dog", "choices are generated, retargeted"),
         ("--labels dog-hop", "Unknown gait 'dog-hop'"),

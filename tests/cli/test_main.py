@@ -24,6 +24,8 @@ def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("files")
     (folder / "text.npz").write_text("not an archive")
     (folder / "empty").mkdir()
+    (folder / "results").mkdir()
+    (folder / "results" / "tokenizer.json").write_text('{"robots": {"go2": ')
     motion = synthetic_motion(seconds=0.5)
     whole = folder / "motions" / "whole.npz"
     save_motion(motion, whole)
@@ -51,6 +53,8 @@ def files(tmp_path_factory):
     (folder / "cut.safetensors").write_bytes(policy.read_bytes()[:-100])
     tokenizer = pretrained_path("tokenizer").read_bytes()
     (folder / "cut_tokenizer.safetensors").write_bytes(tokenizer[:-100])
+    newer = tokenizer.replace(b'\\"format_version\\": 1', b'\\"format_version\\": 2')
+    (folder / "next_tokenizer.safetensors").write_bytes(newer)
     other = folder / "other_tokenizer.safetensors"
     save_tokenizer(make_tiny_model().tokenizer, other, {})
     return folder
@@ -74,6 +78,8 @@ WRONG = {
     "simulate --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
     "simulate --robot a1": "no policy weights for a1 yet; there are some for go2",
     "simulate --gait dog-fly": f"Unknown gait 'dog-fly'; the choices are {GAITS}",
+    "simulate --gait dog-pace,dog-trot": "the time in s at which it begins",
+    "simulate --gait dog-pace,dog-trot@12": "before the end, at 10 s",
     "simulate --duration 0": DURATION,
     "simulate --duration -1": DURATION,
     "simulate --duration nan": DURATION,
@@ -102,12 +108,34 @@ WRONG = {
     "export --policy FILES/policy_of_a1.safetensors": "another robot: a1, not go2",
     "generate --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
     "generate --gait fly": f"Unknown gait 'fly'; the choices are {GAITS}",
+    "generate --gait dog-pace,fly@2": f"Unknown gait 'fly'; the choices are {GAITS}",
+    "generate --gait dog-pace,dog-trot": "the time in s at which it begins, such as",
+    "generate --gait dog-pace,dog-trot@4,dog-pace@2": "rising times above 0 s",
+    "generate --gait dog-pace,dog-trot@12": "before the end, at 10 s",
     "generate --duration nan": DURATION,
+    "generate --duration 0": DURATION,
+    "generate --duration -2": DURATION,
+    "generate --duration 7200": "above 0 and at most 600 s, not 7200",
+    "generate --temperature -1": "temperature must be 0 or more",
+    "generate --top-p 0": "top_p must be above 0 and at most 1",
     "generate --count 0": "--count must be 1 or more, not 0",
     "generate --seed -1": "--seed must be 0 or more, not -1",
     "generate --tokenizer FILES/cut_tokenizer.safetensors": "is damaged",
     "generate --tokenizer FILES/policy.safetensors": "holds policy weights",
     "generate --tokenizer FILES/other_tokenizer.safetensors": "are for the tokenizer",
+    "generate --tokenizer FILES/next_tokenizer.safetensors": "format 2; .* reads 1",
+    "generate --generator FILES/none.safetensors": "There are no generator weights at",
+    "evaluate tokenizer --robot spot": "'spot'; the choices are go2, a1, all",
+    "evaluate tokenizer --labels fly": f"Unknown gait 'fly'; the choices are {GAITS}",
+    "evaluate tokenizer --data-dir FILES/none": "There is no data folder",
+    "evaluate tokenizer --seeds 0": "--seeds must be 1 or more, not 0",
+    "evaluate tokenizer --data-dir FILES/motions --books 99": "from 1 to",
+    "evaluate generation --robot spot": "'spot'; the choices are go2, a1, all",
+    "evaluate generation --labels fly": f"Unknown gait 'fly'; the choices are {GAITS}",
+    "evaluate generation --count 0": "--count must be 1 or more, not 0",
+    "evaluate generation --minutes -1": "--minutes must be 0 or more, not -1",
+    "evaluate generation --data-dir FILES/none": "There is no data folder",
+    "evaluate generation --data-dir FILES/empty --motions FILES/empty": "Motion files",
     "retarget --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
     "retarget --data-dir FILES/none": "There is no data folder .*LOCO_DRAKE_DATA",
     "data list --data-dir FILES/none": "There is no data folder .*LOCO_DRAKE_DATA",
@@ -118,9 +146,20 @@ WRONG = {
     "data inspect FILES/none.txt": "There is no file",
     "data inspect FILES/none.txt --source cat": "'cat'; the choices are dog",
     "train tokenizer --motions FILES/empty": r"no Motion files",
+    "train tokenizer --motions FILES/none": "There is no folder of Motion files",
     "train tokenizer --steps 0": "--steps must be 1 or more, not 0",
+    "train generator --motions FILES/empty": "no Motion files",
+    "train generator --stitched 0": "--stitched must be 1 or more, not 0",
+    "train classifier --motions FILES/empty": "Motion files",
     "train generator --motions FILES/motions --tokenizer FILES/no": "no tokenizer",
     "train tracker --references FILES/empty": r"no Motion files \(\*.npz\)",
+    "report --results FILES/none": "There is no folder of results .*generation.json",
+    "report --results FILES/empty": "no results in .*one or more of retargeting.json",
+    "report --results FILES/results": "tokenizer.json is damaged: it is no JSON",
+    "report --replays dog-fly": f"Unknown gait 'dog-fly'; the choices are {GAITS}",
+    "report --replays none dog-trot": "none, or gait labels, not both",
+    "report --replay-seconds 0": DURATION,
+    "report --seed -1": "--seed must be 0 or more, not -1",
     "train tracker --references FILES/empty --robot spot": "the choices are go2, a1",
     "train tracker --references FILES/empty --batch 9": "--batch must be at least 32",
     "train tracker --references FILES/empty --steps 0": "steps must be at least 1",

@@ -62,6 +62,17 @@ def test_json_has_the_agreed_keys_and_the_table_its_units(weights, tmp_path, cap
     assert f"{figures['normalized_return']:.3f}   of 100" in printed
 
 
+def test_the_gait_changes_while_it_runs(weights, tmp_path):
+    """It is told from a run that keeps the first gait, and that from the start on."""
+    policy = weights / "calm.safetensors"
+    line = ("--duration", 2, "--no-meshcat", "--policy", policy, "--gait")
+    kept = simulate(tmp_path, *line, "dog-pace")
+    changed = simulate(tmp_path, *line, "dog-pace,mpc-trot@0.6")
+    assert changed["gait"] == "dog-pace,mpc-trot@0.6"
+    assert not changed["fell"]
+    assert changed["speed_mps"] > 1.15 * kept["speed_mps"]
+
+
 def test_one_seed_gives_one_outcome_another_seed_another(weights, tmp_path):
     def figures(seed):
         line = ("--duration", 1, "--seed", seed, "--no-meshcat")

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from loco_drake.evaluation.drift import RESOLUTION, drift, worst
+from loco_drake.evaluation.drift import RESOLUTION, beyond_recorded, drift, worst
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import Motion, make_motion
 from tests.synthetic_motion import synthetic_motion
@@ -78,6 +78,49 @@ def test_sinking_and_other_rhythm_and_slipping_are_drift():
         for m in motions
     ]
     assert drift(GO2, skating)["stance_slip_median_mps"]["drift"] > 5
+
+
+def test_turning_late_is_drift():
+    """By .2 rad/s, ten times the least that matters; a steady turn is none."""
+    figures = drift(GO2, halves(lambda speed: {"turn": 0.2}))
+    assert figures["turn_rate_radps"]["last"] == pytest.approx(0.2, abs=0.01)
+    assert figures["turn_rate_radps"]["drift"] == pytest.approx(10.0, rel=0.05)
+    steady = [synthetic_motion(seconds=24.0, speed=v, turn=0.2) for v in SPEEDS]
+    assert drift(GO2, steady)["turn_rate_radps"]["drift"] < 0.1
+
+
+def test_turning_and_sinking_beyond_recordings_by_hand():
+    """The last 10 s turn by .4 rad in 2 s, recordings by .1; .198 over 99 steps.
+
+    The trunk sinks by 1 cm, and recordings are two heights of which 4 mm lie between.
+    """
+    recorded = [synthetic_motion(seconds=3.0, turn=0.05) for _ in range(2)]
+    recorded[1] = replace(
+        recorded[1], base_position=recorded[1].base_position - [0, 0, 0.004]
+    )
+    motions = halves(lambda speed: {"turn": 0.2})
+    late = np.arange(len(motions[0])) > len(motions[0]) // 2
+    lower = [
+        replace(m, base_position=m.base_position - 0.01 * late[:, None] * [0, 0, 1])
+        for m in motions
+    ]
+    found = beyond_recorded(lower, recorded)
+    assert found["recorded_turn_2s_rad"] == pytest.approx(0.05 * 99 / 50, rel=1e-3)
+    assert found["turn_2s_rad"] == pytest.approx(0.2 * 99 / 50, rel=1e-3)
+    assert found["turn_over_recorded"] == pytest.approx(4.0, rel=1e-3)
+    assert found["height_over_recorded"] == pytest.approx(2.5, rel=0.02)
+    assert max(
+        beyond_recorded([synthetic_motion(seconds=24.0, turn=0.05)], recorded).values()
+    ) == pytest.approx(1.0, rel=1e-3)
+
+
+def test_recordings_that_hardly_turn_allow_what_does_not_matter():
+    """A turn of .01 rad/s against none: .01 / .02 of the least that matters."""
+    found = beyond_recorded(
+        [synthetic_motion(seconds=24.0, turn=0.01)], [synthetic_motion(seconds=3.0)]
+    )
+    assert found["recorded_turn_2s_rad"] == pytest.approx(0.0, abs=1e-9)
+    assert found["turn_over_recorded"] == pytest.approx(0.5, rel=1e-3)
 
 
 def test_a_lost_rhythm_is_drift():

@@ -15,6 +15,7 @@ from loco_drake.evaluation.tracking_table import (
     summarize,
 )
 from loco_drake.systems.scenario import GeneratedReference, PlanReference, Scenario
+from loco_drake.tracking.randomization import RandomizationConfig
 
 
 def episode(label="dog-trot", score=80.0, error=0.01, samples=101, slip=(), **changes):
@@ -58,6 +59,24 @@ def test_without_stance_there_is_a_reason():
     got = figures([episode()])
     assert got["stance_slip_median_mps"] is None
     assert got["reason"] == "no toe ever stands"
+
+
+def test_a_trials_world_is_that_of_its_label_and_seed():
+    """Whatever was simulated before; .5 s of a push make joints err more than none."""
+    first, second = generated_trials(["dog-pace"], [3, 4], 0.5)
+    scenario = Scenario(reference=GeneratedReference(gait="dog-pace"))
+
+    def errors(trials, randomization):
+        episodes = run_trials(scenario, trials, randomization=randomization)
+        return [episode.figures["joint_rmse_rad"] for episode in episodes]
+
+    drawn = errors(
+        [first, second, first],
+        RandomizationConfig(push=(1, 1), push_interval=(0.2, 0.2), friction=(0.5, 1)),
+    )
+    assert drawn[0] == drawn[2]
+    plain = errors([first, second], None)
+    assert all(a > b for a, b in zip(drawn, plain, strict=False))
 
 
 def test_labels_and_all_of_them():

@@ -26,6 +26,20 @@ def test_simulate_walks_ahead(tmp_path):
     assert 0.3 < speed < 2.0
 
 
+def test_change_gait_does_both_changes(tmp_path):
+    """The scheduled one when it is due, the one through the port within 6 s."""
+    printed = run(tmp_path, "change_gait.py", "--duration", "14")
+    rows = re.findall(r"^ *(\d+) s  (\S+), ([\d.]+) m/s", printed, re.MULTILINE)
+    gaits = {int(second): gait for second, gait, _ in rows}
+    assert sorted(gaits) == list(range(1, 15))
+    assert {gaits[second] for second in (1, 2, 3)} == {"dog-pace"}
+    assert {gaits[second] for second in (5, 6, 7)} == {"dog-trot"}
+    assert {gaits[second] for second in (13, 14)} == {"horse-walk"}
+    speeds = {gait: float(speed) for _, gait, speed in rows}  # the last one of each
+    assert speeds["dog-pace"] < 1.0 < speeds["dog-trot"]
+    assert speeds["horse-walk"] < speeds["dog-trot"]
+
+
 def test_retarget_saves_a_replay_of_the_recording(tmp_path):
     write_dog_recording(tmp_path / "dog.txt", "trot", seconds=2.0)
     arguments = ("--gait", "trot", "--end", "90", "--html", "replay.html")

@@ -46,6 +46,17 @@ def test_feet_of_a_motion_that_slips_stand(make_synthetic):
     assert abs(mended - true) < 0.8 * abs(raw - true)
 
 
+def test_the_base_is_drawn_to_its_feet_without_a_jolt(make_synthetic):
+    """Its correction changes by at most .15 (.05 * 60 mm + itself) a frame."""
+    features = ft.motion_features(GO2, make_synthetic("dog-trot", 4.0, 0.8))[None]
+    features[..., 0] *= 1.15
+    plain = ft.positions(GO2, features, ft.integrate_path(GO2, features, ORIGIN))
+    _, q, _ = step_footing(GO2, start_footing(ORIGIN), features)
+    correction = np.diff((q - plain)[0, :, 4:6], axis=0)
+    assert np.abs(correction).max() > 5e-4
+    assert np.abs(np.diff(correction, axis=0)).max() < 2 * 0.15 * 0.05 * 0.06
+
+
 def test_no_toe_is_below_the_ground(make_synthetic):
     features = ft.motion_features(GO2, make_synthetic("dog-pace", 2.0, 0.8))[None]
     features[..., ft.HEIGHT] -= 0.03 / GO2.stand_height
@@ -86,3 +97,13 @@ def test_joints_stay_within_their_limits(make_synthetic):
     _, q, _ = step_footing(GO2, start_footing(ORIGIN), features)
     assert (q[..., 7:] >= GO2.joint_lower).all()
     assert (q[..., 7:] <= GO2.joint_upper).all()
+
+
+def test_a_leg_that_cannot_fold_raises_the_base(make_synthetic):
+    """At a quarter of the stand height calves are at their limit."""
+    features = ft.motion_features(GO2, make_synthetic("dog-pace", 1.0, 0.0))[None]
+    features[..., ft.HEIGHT] = 0.25
+    _, q, _ = step_footing(GO2, start_footing(ORIGIN), features)
+    assert (q[..., 7:] >= GO2.joint_lower).all()
+    assert (q[..., 6] > 0.3 * GO2.stand_height).all()
+    assert toes_of(q)[..., 2].min() > GO2.foot_radius - 1e-3

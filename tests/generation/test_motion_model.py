@@ -5,8 +5,13 @@ import pytest
 import torch
 
 from loco_drake.errors import InputError
-from loco_drake.gaits import parse_label
-from loco_drake.generation.generate import generate_motion, generate_motions
+from loco_drake.gait_schedule import parse_schedule
+from loco_drake.gaits import LABELS, parse_label
+from loco_drake.generation.generate import (
+    SEVERAL,
+    generate_motion,
+    generate_motions,
+)
 from loco_drake.generation.motion_model import MotionModel, load_motion_model
 from loco_drake.generation.tokenizer import (
     Tokenizer,
@@ -192,8 +197,22 @@ def test_motions_side_by_side_are_those_one_by_one(model):
     together = generate_motions(model, PACE, 1.5, [3, 4])
     alone = generate_motion(model, PACE, 1.5, 4)
     np.testing.assert_allclose(
-        together[1].joint_positions, alone.joint_positions, atol=1e-5
+        together[1].joint_positions, alone.joint_positions, atol=1e-9
     )
+
+
+def test_a_motion_of_several_gaits_says_which(model):
+    schedule = parse_schedule("dog-pace,dog-trot@1.2")
+    (motion,) = generate_motions(model, schedule, 2.0, [5])
+    (pace,) = generate_motions(model, PACE, 2.0, [5])
+    assert motion.label == SEVERAL not in LABELS
+    assert motion.provenance["generated"] == "dog-pace,dog-trot@1.2 for 2 s"
+    # A chunk is decoded as a whole, but nothing of it can tell of a later token.
+    same = np.isclose(motion.joint_positions, pace.joint_positions, atol=1e-6)
+    assert same.all(axis=1)[: round(1.2 * 50)].all()
+    assert not same.all(axis=1)[-20:].any()
+    with pytest.raises(InputError, match="before the end, at 1 s"):
+        generate_motions(model, schedule, 1.0, [5])
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, np.nan, np.inf, 601.0])

@@ -7,7 +7,7 @@ import torch
 from loco_drake.gaits import parse_label
 from loco_drake.generation import features as ft
 from loco_drake.generation.library import motion_clip
-from loco_drake.generation.windows import WINDOW, PairedWindows
+from loco_drake.generation.windows import EXACT, WINDOW, PairedWindows
 from tests.synthetic_motion import synthetic_motion
 
 ROBOTS = ("a1", "go2")
@@ -59,3 +59,12 @@ def test_clips_of_which_nothing_is_known_are_not_paired():
     unknown = [clip(robot, file="") for robot in ROBOTS]
     frames, *_ = PairedWindows(unknown, ROBOTS)(np.random.default_rng(0), 8)
     assert len(frames) == 8
+
+
+def test_half_of_the_windows_are_frames_as_they_are(clips):
+    """The others lie between frames, or are played faster or slower."""
+    single = clips[-1]
+    frames, *_ = PairedWindows([single], ROBOTS)(np.random.default_rng(0), 200)
+    rows = {row.tobytes() for row in single.features.astype(np.float32)}
+    exact = [all(f.numpy().tobytes() in rows for f in window) for window in frames]
+    assert np.mean(exact) == pytest.approx(EXACT, abs=0.1)

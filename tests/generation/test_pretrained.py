@@ -1,5 +1,6 @@
 import json
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -7,6 +8,8 @@ import torch
 
 from loco_drake.cli.generate import Generate
 from loco_drake.errors import InputError
+from loco_drake.evaluation.gait_change import forward_speed, roughness
+from loco_drake.gait_schedule import parse_schedule
 from loco_drake.gaits import parse_label
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.pretrained import (
@@ -21,6 +24,7 @@ from loco_drake.motion_quality import (
     stance_slip_median,
     toe_trajectories,
 )
+from tests.process import run_python
 
 
 def test_weights_are_small():
@@ -81,6 +85,111 @@ def test_pairs_of_legs_of_the_gaits():
         assert with_fl[partner] > 0.4
 
 
+# To brake from 1.5 m/s to .4 takes a little more than trotting does.
+CHANGES = {
+    "dog-pace,dog-trot@4,dog-gallop@8": 1.1,
+    "mpc-crawl,mpc-trot@4,horse-walk@8": 1.3,
+}
+
+
+@pytest.mark.parametrize("text", CHANGES)
+def test_gaits_change_without_a_jump_and_within_a_second(text):
+    """Steps and accelerations are those of the gaits, and so is the speed soon after.
+
+    The speed from one second after a change on is as near to that of the new gait as
+    motions of the gait are to each other, and a quarter of what the gaits differ by.
+    """
+    model, schedule = pretrained_motion_model("go2"), parse_schedule(text)
+    seeds = range(6)
+    steady = {
+        label: generate_motions(model, label, 8.0, seeds) for label in schedule.labels
+    }
+    motions = generate_motions(model, schedule, 12.0, seeds)
+    speeds = {
+        label: [forward_speed(model.robot, m).mean() for m in own]
+        for label, own in steady.items()
+    }
+    for before, after, start in zip(
+        schedule.labels, schedule.labels[1:], schedule.starts[1:], strict=False
+    ):
+        usual = [*steady[before], *steady[after]]
+        for motion in motions:
+            assert max(roughness(motion, start, usual).values()) <= CHANGES[text]
+        arrived = slice(round((start + 1) * 50), round((start + 4) * 50))
+        reached = [forward_speed(model.robot, m)[arrived].mean() for m in motions]
+        apart = abs(np.mean(speeds[after]) - np.mean(speeds[before]))
+        near = 2 * np.std(speeds[after]) + 0.25 * apart
+        assert abs(np.mean(reached) - np.mean(speeds[after])) <= near
+
+
+def test_a_pace_is_a_trot_by_its_legs_a_second_after_the_change():
+    """The left front leg swings with the left rear one, then with the right rear one."""
+    model, schedule = (
+        pretrained_motion_model("go2"),
+        parse_schedule("dog-pace,dog-trot@4"),
+    )
+    for motion in generate_motions(model, schedule, 8.0, range(4)):
+        thighs = motion.joint_positions[:, 1::3]
+        for frames, partner in ((thighs[:200], 2), (thighs[250:], 3)):
+            with_fl = np.corrcoef(frames.T)[0]
+            assert with_fl[partner] == max(with_fl[1:])
+
+
+THREADS = """
+import hashlib, numpy as np, torch
+from loco_drake.evaluation.gait_change import forward_speed, roughness
+from loco_drake.gait_schedule import parse_schedule
+from loco_drake.gaits import parse_label
+from loco_drake.generation.pretrained import pretrained_motion_model
+torch.set_num_threads({threads})
+model = pretrained_motion_model("go2")
+stream = model.start(np.array([7]), 10.0)
+digest = hashlib.sha256()
+for label in ("dog-trot", "dog-trot", "solo8-stilt"):
+    stream, frames = model.extend(stream, np.array([parse_label(label).index]))
+    digest.update(stream.tokens.tobytes() + frames.q.tobytes())
+assert torch.get_num_threads() == {threads}
+print(digest.hexdigest())
+"""
+
+
+def test_processes_of_any_number_of_threads_write_the_same(tmp_path):
+    """Tokens and frames, to the last bit; OpenMP has as many threads as torch."""
+    printed = [
+        run_python(
+            "-c",
+            THREADS.format(threads=threads),
+            cwd=tmp_path,
+            OMP_NUM_THREADS=str(threads),
+            PYTHONPATH=str(Path(__file__).parents[2]),
+        )
+        for threads in (1, 2)
+    ]
+    assert printed[0] == printed[1]
+
+
+def test_tokens_do_not_depend_on_what_is_written_beside_them():
+    """One motion alone, and among 2, 5 and 32 others, at any place."""
+    model = pretrained_motion_model("go2")
+    label = parse_label("horse-trot").index
+
+    def written(seeds, chunks=3):
+        stream, parts = model.start(np.array(seeds), 10.0), []
+        for _ in range(chunks):
+            stream, frames = model.extend(stream, np.full(len(seeds), label))
+            parts.append((stream.tokens, frames))
+        tokens = [part[:, -model.chunk_tokens :] for part, _ in parts]
+        q = np.concatenate([frames.q for _, frames in parts], axis=1)
+        return np.concatenate(tokens, axis=1), q
+
+    tokens, q = written([3])
+    for seeds in ([3, 9, 1], [8, 0, 5, 6, 2, 3], [*range(100, 132), 3]):
+        others, others_q = written(seeds)
+        place = seeds.index(3)
+        np.testing.assert_array_equal(others[place], tokens[0])
+        np.testing.assert_allclose(others_q[place], q[0], atol=1e-9)
+
+
 def test_a_second_for_one_robot_takes_a_fraction_of_it():
     """A loose bound: machines differ, and tests share theirs."""
     model = pretrained_motion_model("go2")
@@ -117,6 +226,17 @@ def test_the_command_writes_motions_and_figures(tmp_path):
         pretrained_motion_model("go2"), parse_label("dog-pace"), 2.0, [8]
     )
     np.testing.assert_allclose(again.joint_positions, motion.joint_positions, atol=1e-4)
+
+
+def test_the_command_changes_the_gait_on_the_way(tmp_path):
+    gait = "dog-pace,dog-trot@1"
+    assert Generate(gait=gait, duration=2.0, out=tmp_path).run() == 0
+    (path,) = tmp_path.iterdir()
+    assert path.name == f"{gait}-0.npz"
+    motion = load_motion(path)
+    assert len(motion) == 101
+    assert str(motion.label) == "several-gaits"
+    assert motion.provenance["generated"] == f"{gait} for 2 s"
 
 
 @pytest.mark.parametrize(

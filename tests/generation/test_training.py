@@ -25,7 +25,11 @@ from loco_drake.generation.train_generator import (
     stitched_clips,
     train_generator,
 )
-from loco_drake.generation.train_tokenizer import Scales, train_tokenizer
+from loco_drake.generation.train_tokenizer import (
+    Scales,
+    energy_error,
+    train_tokenizer,
+)
 from loco_drake.generation.training import LoopSettings
 
 TINY = TokenizerConfig(width=24, depth=1, frame_width=8, books=2, book_size=16)
@@ -66,8 +70,8 @@ def test_training_makes_the_tokenizer_better(library, tokenizer, tmp_path):
     untrained, _ = train_tokenizer(library, TINY, LoopSettings(tmp_path, 1, 3e-3))
     before = score_tokenizer(untrained, library.held_out)
     after = score_tokenizer(tokenizer, library.held_out)
-    assert after.joint_rmse_rad < 0.6 * before.joint_rmse_rad
-    assert after.toe_error_rmse_m < 0.6 * before.toe_error_rmse_m
+    assert after.joint_rmse_rad < 0.75 * before.joint_rmse_rad
+    assert after.toe_error_rmse_m < 0.75 * before.toe_error_rmse_m
 
 
 def test_training_makes_the_generator_better(library, tokenizer, tmp_path):
@@ -208,3 +212,19 @@ def test_errors_are_measured_by_what_varies_within_a_label():
         variances = np.array([0.2**2 / 2 + spread, 0.1**2 / 2, both + spread / 2])
         own = scale[:, 0, 0].numpy() / factor
         np.testing.assert_allclose(own, np.sqrt(variances), rtol=0.01)
+
+
+def test_a_tremor_counts_whatever_its_phase():
+    """Of tremors out of phase squared errors are large; energies are the same.
+
+    With none at all, log(QUIET^2) / 2 = -1.61 is left of log(1 + QUIET^2) / 2 = .02.
+    """
+    time = torch.arange(64)[None, :, None]
+    omega = torch.tensor(2 * np.pi * 10 / 50)  # 10 Hz
+    unit = torch.full((1, 1, 18), 2**-0.5) * (2 * torch.sin(omega / 2)) ** 2
+    sine = torch.sin(omega * time).expand(1, 64, SIZE)
+    cosine = torch.cos(omega * time).expand(1, 64, SIZE)
+    assert energy_error(sine, cosine, unit) < 1e-4
+    assert energy_error(torch.zeros_like(sine), sine, unit).item() == pytest.approx(
+        (1.609 + 0.020) ** 2, abs=0.1
+    )

@@ -34,8 +34,8 @@ def test_from_motions_to_new_motions_by_three_commands(motions, tmp_path):
     )
     assert learn.run() == 0
     assert json.loads((tmp_path / "generator.json").read_text())["steps"] == 2
-    learn.books = 9
-    with pytest.raises(InputError, match="--books must be from 1 to 8"):
+    learn.books = 13
+    with pytest.raises(InputError, match="--books must be from 1 to 12"):
         learn.run()
     generate = Generate(
         gait="dog-trot",

@@ -90,6 +90,65 @@ def test_a_new_gait_holds_from_the_next_chunk_on(generator):
     assert (labels[written + 1 :] == PACE).all()
 
 
+def test_a_schedule_is_kept_to_a_token(go2, model):
+    """However far ahead it writes, a gait begins when it is due on the plan's clock."""
+    config = GeneratedReference(gait="dog-pace,dog-trot@1.5,dog-pace@4", seed=3)
+    generator = ReferenceGenerator(go2, config, model)
+    simulator = Simulator(generator)
+    labels = {}
+    for time in (0.0, 1.0, 2.0):
+        simulator.AdvanceTo(time)
+        plan = plan_at(generator, simulator.get_context())
+        first = round(plan.start_time / PLAN_DT)
+        labels |= {first + k: label for k, label in enumerate(plan.labels)}
+    changes = [k for k in sorted(labels)[1:] if labels[k] != labels[k - 1]]
+    late = np.array(changes) * PLAN_DT - [1.5, 4.0]
+    assert (late >= 0).all()
+    assert (late <= (model.frames_per_token + 1) * PLAN_DT).all()
+    assert [labels[0], labels[changes[0]], labels[changes[1]]] == [PACE, TROT, PACE]
+    generator.SetReference(simulator.get_mutable_context(), gait="dog-trot", seed=3)
+    assert (plan_at(generator, simulator.get_context()).labels == TROT).all()
+
+
+@pytest.mark.parametrize("how", ["schedule", "port"])
+def test_clones_and_resets_repeat_a_change_of_gait(how, go2, model):
+    """To the last bit, also when the context is cloned in the middle of it."""
+    gait = "dog-pace,dog-trot@2" if how == "schedule" else "dog-pace"
+    generator = ReferenceGenerator(go2, GeneratedReference(gait=gait), model)
+
+    def run(context, end):
+        simulator = Simulator(generator, context)
+        if how == "port":
+            now = np.arange(context.get_time(), end, 0.1)
+            for time in now:
+                label = PACE if time < 1.05 else TROT
+                generator.GetInputPort("gait").FixValue(context, float(label))
+                simulator.AdvanceTo(min(time + 0.1, end))
+        simulator.AdvanceTo(end)
+        return plan_at(generator, context)
+
+    context = generator.CreateDefaultContext()
+    run(context, 1.0)
+    clone = context.Clone()
+    ours = run(context, 6.0)
+    theirs = run(clone, 6.0)
+    assert ours is not theirs
+    np.testing.assert_array_equal(ours.state, theirs.state)
+    assert ours.labels[-1] == TROT
+    generator.SetDefaultContext(context)
+    context.SetTime(0.0)
+    again = run(context, 6.0)
+    np.testing.assert_array_equal(ours.state, again.state)
+
+
+def test_a_gait_that_is_none_is_refused_by_the_port(generator):
+    simulator = Simulator(generator)
+    context = simulator.get_mutable_context()
+    generator.GetInputPort("gait").FixValue(context, 99.0)
+    with pytest.raises(InputError, match="index from 0 to 14, not 99"):
+        simulator.AdvanceTo(2.0)
+
+
 def test_seed_and_gait_can_be_set_in_a_context(generator):
     context = generator.CreateDefaultContext()
     default = plan_at(generator, context)
@@ -131,6 +190,8 @@ def test_a_cloned_context_writes_the_same(go2, model):
     [
         ({"gait": "dog-waltz"}, "dog-pace, dog-trot"),
         ({"gait": "horse-walk"}, "not trained on horse-walk"),
+        ({"gait": "dog-trot,horse-walk@30"}, "not trained on horse-walk"),
+        ({"gait": "dog-trot,dog-pace@3,dog-trot@2"}, "rising times"),
         ({"seed": -1}, "seed must be 0 or more"),
         ({"duration": 0.0}, "duration must be above 0"),
         ({"duration": float("nan")}, "duration must be above 0"),

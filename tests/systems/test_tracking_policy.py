@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -10,7 +12,7 @@ from loco_drake.systems.actor import (
     load_actor,
     save_actor,
 )
-from loco_drake.systems.observation import OBSERVATION_SIZE
+from loco_drake.systems.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
 from loco_drake.systems.symmetry import mirror_actions, mirror_observations
 from loco_drake.systems.tracking_policy import TrackingPolicy
 from loco_drake.weights import load_weights, save_weights
@@ -45,6 +47,42 @@ def test_the_system_computes_the_network(actor):
     expected = (results[0] + mirror_actions(results[1])) / 2
     action = policy.GetOutputPort("action").Eval(context)
     np.testing.assert_allclose(action, expected, atol=1e-5)
+
+
+def test_hidden_parts_are_at_their_mean(actor):
+    """Actions are those of a privileged actor that sees the mean there.
+
+    The mean must be its own mirror image, as training's is.
+    """
+    actor.mean.copy_((actor.mean + mirror_observations(actor.mean)) / 2)
+    actor.variance.fill_(0.5)
+    observation = torch.randn(4, OBSERVATION_SIZE)
+    mean_there, start = observation.clone(), 0
+    for name, size in OBSERVATION_LAYOUT:
+        if name in ("v_WB_H", "height", "plan_p_H"):
+            mean_there[:, start : start + size] = actor.mean[start : start + size]
+        start += size
+    with torch.inference_mode():
+        expected, privileged = actor(mean_there), actor(observation)
+        actor.config = replace(actor.config, privileged=False)
+        hidden = actor(observation)
+    torch.testing.assert_close(hidden, expected)
+    assert (hidden - privileged).abs().max() > 1e-3
+
+
+def test_weights_know_whether_they_are_privileged_and_old_ones_are(actor, tmp_path):
+    path = tmp_path / "policy.safetensors"
+    actor.config = replace(actor.config, privileged=False)
+    save_actor(actor, path)
+    again = load_actor(path, get_robot("go2"))
+    assert not again.config.privileged
+    observation = torch.randn(OBSERVATION_SIZE)
+    with torch.inference_mode():
+        torch.testing.assert_close(again(observation), actor(observation))
+    tensors, config = load_weights(path, "policy")
+    del config["privileged"]
+    save_weights(path, "policy", tensors, config)
+    assert load_actor(path, get_robot("go2")).config.privileged
 
 
 @pytest.mark.parametrize("half", [False, True])

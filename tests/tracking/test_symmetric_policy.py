@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.systems.observation import OBSERVATION_SIZE
+from loco_drake.systems.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
 from loco_drake.systems.symmetry import mirror_actions, mirror_observations
 from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
 from loco_drake.tracking.symmetric_policy import SymmetricPolicy, SymmetricStatistics
@@ -24,6 +24,38 @@ def test_an_image_is_as_likely_and_as_valuable_as_the_step():
     torch.testing.assert_close(value, image_value)
     torch.testing.assert_close(log_prob, image_log_prob)
     assert (changed - log_prob).abs().max() > 0.1
+
+
+def test_an_unprivileged_actor_sees_less_and_its_critic_all():
+    """Other positions and speeds of the base: the same actions, other values."""
+    torch.manual_seed(0)
+    policy = SymmetricPolicy(
+        OBSERVATION_SPACE, ACTION_SPACE, lambda _: 1e-3, privileged=False
+    )
+    torch.nn.init.normal_(policy.action_net.weight, std=0.1)
+    observations = torch.randn(6, OBSERVATION_SIZE)
+    others = observations.clone()
+    start, hidden = 0, 0
+    for name, size in OBSERVATION_LAYOUT:
+        if name in ("v_WB_H", "height", "plan_p_H"):
+            others[:, start : start + size] = torch.randn(6, size)
+            hidden += size
+        start += size
+    assert hidden == 3 + 1 + 12
+    seen = observations.clone()
+    seen[:, 0] += 1.0  # gravity
+    with torch.inference_mode():
+        mean = policy.get_distribution(observations).distribution.mean
+        other_mean = policy.get_distribution(others).distribution.mean
+        seen_mean = policy.get_distribution(seen).distribution.mean
+        mirrored = mirror_observations(observations)
+        image_mean = policy.get_distribution(mirrored).distribution.mean
+        values = policy.predict_values(observations)
+        other_values = policy.predict_values(others)
+    torch.testing.assert_close(other_mean, mean, rtol=0, atol=0)
+    assert (seen_mean - mean).abs().max() > 1e-3
+    torch.testing.assert_close(image_mean, mirror_actions(mean))
+    assert (other_values - values).abs().min() > 1e-6
 
 
 def test_sampled_actions_have_the_probability_that_is_told():

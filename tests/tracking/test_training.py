@@ -15,9 +15,11 @@ from loco_drake.systems.symmetry import mirror_actions, mirror_observations
 from loco_drake.tracking.checkpoint import load_checkpoint
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.ppo import PpoConfig
+from loco_drake.tracking.randomization import STANDARD
 from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.train import TrainingConfig, train_tracker
 from loco_drake.tracking.workers import WorkerVecEnv
+from loco_drake.weights import save_weights
 
 TROT, PACE = parse_label("dog-trot").index, parse_label("dog-pace").index
 
@@ -123,6 +125,60 @@ def test_other_networks_cannot_be_resumed(trained, plans):
     other.ppo.hidden = [8, 8]
     with pytest.raises(InputError, match="hidden"):
         train_tracker(plans, other, trained[0], resume=True)
+
+
+def test_a_training_can_start_from_another_one(trained, plans, tmp_path):
+    """Networks and normalizer are its; steps, optimizer and sampler are new."""
+    tensors, header = trained[4]
+    other = config(0)  # only begins
+    other.environment.randomization = STANDARD
+    figures = train_tracker(
+        plans, other, tmp_path, first=trained[0] / "checkpoint.safetensors"
+    )
+    assert figures["steps"] == 0
+    begun, state = load_checkpoint(tmp_path / "checkpoint.safetensors")
+    for name, value in tensors.items():
+        if name.startswith(("policy/", "normalizer/")):
+            torch.testing.assert_close(begun[name], value, rtol=0, atol=0)
+    assert not [name for name in begun if name.startswith("optimizer/")]
+    assert (begun["sampler/scores"] == 0).all()
+    assert state["state"]["normalizer_count"] == header["state"]["normalizer_count"]
+    assert state["state"]["learning_rate"] == other.ppo.actor_rate
+
+
+def test_an_unprivileged_policy_can_start_from_a_privileged_one(
+    trained, plans, tmp_path
+):
+    """One batch on: counted from there, by Adam too; it must be resumed as it is."""
+    other = config(64, privileged=False)
+    train_tracker(plans, other, tmp_path, first=trained[0] / "checkpoint.safetensors")
+    tensors, header = load_checkpoint(tmp_path / "checkpoint.safetensors")
+    assert header["state"]["steps"] == 64
+    steps = [v for k, v in tensors.items() if k.endswith("/step")]
+    assert {float(step) for step in steps} == {4.0}
+    actor = load_actor(tmp_path / "policy.safetensors", get_robot("go2"))
+    assert not actor.config.privileged
+    with pytest.raises(InputError, match="'privileged': False"):
+        train_tracker(plans, config(128), tmp_path, resume=True)
+
+
+def test_other_networks_and_observations_cannot_be_started_from(
+    trained, plans, tmp_path
+):
+    checkpoint, out = trained[0] / "checkpoint.safetensors", tmp_path / "out"
+    wide = config(64)
+    wide.ppo.hidden = [8, 8]
+    with pytest.raises(InputError, match=r"'hidden': \[16, 16\]"):
+        train_tracker(plans, wide, out, first=checkpoint)
+    tensors, header = load_checkpoint(checkpoint)
+    header["config"]["observation_layout"][0][0] = "gravity_W"
+    other = tmp_path / "other.safetensors"
+    save_weights(other, "tracker checkpoint", tensors, header)
+    with pytest.raises(InputError, match="another observation layout"):
+        train_tracker(plans, config(64), out, first=other)
+    with pytest.raises(InputError, match="not both"):
+        train_tracker(plans, config(64), out, resume=True, first=checkpoint)
+    assert not out.exists()
 
 
 def test_nothing_cannot_be_resumed(plans, tmp_path):

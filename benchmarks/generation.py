@@ -1,0 +1,122 @@
+"""What generated motion costs: a chunk in the diagram, and motions by the batch.
+
+Times are of the process on one thread: processor time, which other work on the machine
+lengthens less than the time on the clock, which is printed, too. A chunk is about a
+second: tokens, decoding, footing and the plan, as ReferenceGenerator's event does it
+while a simulation runs. The smoother re-times a chunk in an event of its own. Run it
+from the root of the repository:
+
+    OMP_NUM_THREADS=1 python benchmarks/generation.py
+"""
+
+import statistics
+import time
+from collections.abc import Callable
+
+import torch
+import tyro
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem
+
+from loco_drake.gaits import LABELS, parse_label
+from loco_drake.generation.generate import generate_motion, generate_motions
+from loco_drake.generation.pretrained import pretrained_motion_model
+from loco_drake.models.robots import get_robot
+from loco_drake.systems.plan import plan_from_motion
+from loco_drake.systems.plan_player import PlanPlayer
+from loco_drake.systems.reference_generator import ReferenceGenerator
+from loco_drake.systems.scenario import GeneratedReference
+from loco_drake.systems.toppra_smoother import ToppraSmoother
+
+PERIOD = 0.1  # s, of the systems' events
+
+Times = list[tuple[float, float]]  # processor time and time on the clock, s
+
+
+def timed(work: Callable[[], object]) -> tuple[float, float]:
+    """Returns how long ``work`` takes."""
+    wall, processor = time.perf_counter(), time.process_time()
+    work()
+    return time.process_time() - processor, time.perf_counter() - wall
+
+
+def planning_events(system: Diagram | LeafSystem, seconds: float) -> Times:
+    """Simulates, and returns how long each event took that made more of the plan.
+
+    The first two, which load and set up what the later ones use, do not count.
+    """
+    simulator = Simulator(system)
+    port, context = system.GetOutputPort("plan"), simulator.get_context()
+    simulator.Initialize()
+    end, times = port.Eval(context).end_time, []
+    for step in range(1, round(seconds / PERIOD) + 1):
+        cost = timed(lambda now=step * PERIOD: simulator.AdvanceTo(now))
+        if port.Eval(context).end_time > end:
+            end = port.Eval(context).end_time
+            times.append(cost)
+    return times[2:]
+
+
+def smoother_alone(robot: str, gait: str, seconds: float) -> Diagram:
+    """Returns a smoother of a plan that is there already."""
+    motion = generate_motion(
+        pretrained_motion_model(robot), parse_label(gait), seconds, 0
+    )
+    builder = DiagramBuilder()
+    model = get_robot(robot)
+    player = builder.AddSystem(PlanPlayer(model, plan_from_motion(model, motion)))
+    smoother = builder.AddSystem(ToppraSmoother(model))
+    builder.Connect(player.GetOutputPort("plan"), smoother.GetInputPort("plan"))
+    builder.ExportOutput(smoother.GetOutputPort("plan"), "plan")
+    return builder.Build()
+
+
+def row(name: str, times: Times) -> str:
+    """Returns a row of the table: medians and maxima in ms."""
+    cells = []
+    for column in zip(*times, strict=True):
+        cells += [
+            f"{1000 * statistics.median(column):.1f}",
+            f"{1000 * max(column):.1f}",
+        ]
+    return f"| {name}, {len(times)} times | {' | '.join(cells)} |"
+
+
+def main(
+    robot: str = "go2",
+    seconds: float = 30.0,
+    count: int = 32,
+    duration: float = 10.0,
+    gait: str = "dog-trot",
+) -> None:
+    """Prints two tables.
+
+    Args:
+        robot: to generate for.
+        seconds: of simulation.
+        count: motions side by side.
+        duration: of each, in s.
+        gait: of the simulation.
+    """
+    torch.set_num_threads(1)
+    model = pretrained_motion_model(robot)
+    print("| ms | processor, median | most | clock, median | most |")
+    print("|---|---:|---:|---:|---:|")
+    generator = ReferenceGenerator(get_robot(robot), GeneratedReference(gait=gait))
+    print(row("a chunk of motion", planning_events(generator, seconds)))
+    smoother = smoother_alone(robot, gait, seconds + 5)
+    print(row("smoothing a chunk", planning_events(smoother, seconds)))
+    print("\n| times real time | by processor | by the clock |")
+    print("|---|---:|---:|")
+    for size in sorted({1, count}):
+        costs = [
+            timed(lambda s=size, k=k: generate_motions(model, k, duration, range(s)))
+            for k in (parse_label(gait), LABELS[-1], parse_label(gait))
+        ][1:]
+        made = len(costs) * size * duration
+        speeds = [f"{made / sum(column):.0f}" for column in zip(*costs, strict=True)]
+        print(f"| {size} side by side | {' | '.join(speeds)} |")
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

@@ -1,0 +1,75 @@
+"""What weights were trained on, in the header of their file."""
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from loco_drake import __version__
+from loco_drake.generation.library import Library, recording_name
+from loco_drake.motion import FPS, Motion
+from loco_drake.weights import load_weights
+
+if TYPE_CHECKING:  # it loads what only training needs
+    from loco_drake.generation.training import LoopSettings
+
+# Settings that change where a run writes, but not what it learns.
+_OF_THE_RUN = ("out", "resume", "checkpoint_every", "log_every")
+
+
+def training_record(library: Library, settings: "LoopSettings") -> dict[str, Any]:
+    """Returns the record of a training, as JSON.
+
+    Returns:
+        ``robots``; ``recordings``, the seconds of motion learned from of each subject
+        (a recording, or an animal with all of its own) and robot, mirror images not
+        counted; ``held_out``, the subjects that were not; and the settings.
+    """
+    seconds: dict[str, dict[str, float]] = {}
+    for clip in library.train[: len(library.train) // 2]:  # then come mirror images
+        of_robot = seconds.setdefault(clip.recording, {})
+        of_robot[clip.robot] = of_robot.get(clip.robot, 0.0) + len(clip) / FPS
+    return {
+        "robots": list(library.robots),
+        "recordings": {
+            name: {robot: round(s, 2) for robot, s in sorted(of_robot.items())}
+            for name, of_robot in sorted(seconds.items())
+        },
+        "held_out": sorted({clip.recording for clip in library.held_out}),
+        **{k: v for k, v in asdict(settings).items() if k not in _OF_THE_RUN},
+        "loco_drake": __version__,
+    }
+
+
+def read_training_record(path: Path, kind: str) -> dict[str, Any] | None:
+    """Returns the record in a weights file, None if there is none.
+
+    Args:
+        path: of the weights.
+        kind: "tokenizer" or "generator".
+
+    Raises:
+        InputError: if the file is missing, damaged, or of something else.
+    """
+    _, config = load_weights(path, kind)
+    info = config.get("info")
+    record = info.get("training") if isinstance(info, dict) else None
+    known = isinstance(record, dict) and isinstance(record.get("recordings"), dict)
+    return record if known else None
+
+
+def seen_in_training(
+    record: dict[str, Any] | None, motions: Iterable[Motion]
+) -> list[str] | None:
+    """Returns which of the recordings of ``motions`` weights were trained on.
+
+    Args:
+        record: from :func:`read_training_record`.
+        motions: retargeted recordings.
+
+    Returns:
+        Sorted names of subjects; None if it was not recorded.
+    """
+    if record is None:
+        return None
+    return sorted({recording_name(m) for m in motions} & set(record["recordings"]))

@@ -1,0 +1,53 @@
+"""What a training log says of how returns grew."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+PROGRESS = "progress.jsonl"
+POINTS = 200
+_PREFIX = "return/"
+
+
+def learning_curve(log: Path, points: int = POINTS) -> dict[str, Any]:
+    """Returns the learning curve of a log that training writes, thinned.
+
+    Of runs that were resumed, which all add to one log, the seconds are summed.
+
+    Args:
+        log: ``progress.jsonl``, a line for each batch.
+        points: how many lines to keep at most; first and last are among them.
+
+    Returns:
+        "steps" of the environment and "seconds" of training so far, and under "return"
+        for each label its mean normalized return (0-100) in recent episodes of the
+        training, None before the label was trained on. All are equally long.
+    """
+    lines = [json.loads(line) for line in log.read_text().splitlines()]
+    seconds, before = [], 0.0
+    for earlier, line in zip([None, *lines], lines, strict=False):
+        if earlier is not None and line["seconds"] < earlier["seconds"]:
+            before += earlier["seconds"]
+        seconds.append(before + line["seconds"])
+    ends = np.linspace(0, len(lines) - 1, points if lines else 0)
+    kept = np.unique(ends.round().astype(int))
+    labels = {
+        name.removeprefix(_PREFIX): None
+        for line in lines
+        for name in line
+        if name.startswith(_PREFIX) and "-" in name
+    }
+    return {
+        "steps": [int(lines[i]["steps"]) for i in kept],
+        "seconds": [round(seconds[i], 1) for i in kept],
+        "return": {
+            label: [_rounded(lines[i].get(_PREFIX + label)) for i in kept]
+            for label in labels
+        },
+    }
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 2)

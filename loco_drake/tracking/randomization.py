@@ -1,0 +1,202 @@
+"""What differs from episode to episode: the distribution of domains."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.errors import InputError
+from loco_drake.models.robots import Robot
+from loco_drake.systems.actuation import MAX_LATENCY
+from loco_drake.systems.domain import Domain, Push, SensorErrors
+from loco_drake.systems.plan import PLAN_DT
+from loco_drake.systems.scenario import Disturbances
+from loco_drake.systems.sensors import error_vector
+
+Array = NDArray[np.float64]
+
+PUSH_DURATION = 0.1  # s
+
+# Standard deviations of the sensors' errors at noise 1. White: about those of the
+# uniform noise of legged_gym (Rudin et al. 2022), .1 m/s and .2 rad/s for the base,
+# .01 rad for the joints, but for the joints' speeds, which encoders give better than
+# 1.5 rad/s. Bias: what calibration and state estimation leave.
+WHITE = error_vector(
+    orientation=0.01,
+    position=0.005,
+    joint_positions=0.005,
+    angular_velocity=0.1,
+    velocity=0.05,
+    joint_velocities=0.5,
+)
+BIAS = error_vector(
+    orientation=0.03,
+    position=0.02,
+    joint_positions=0.01,
+    angular_velocity=0.01,
+    velocity=0.03,
+)
+
+
+@dataclass(kw_only=True)
+class RandomizationConfig:
+    """Ranges that each episode's world is drawn from; a part that is None is off.
+
+    Draws are uniform within a range, unless said otherwise. docs/tracking.md says how
+    each part is modelled and where the ranges of STANDARD come from.
+    """
+
+    friction: tuple[float, float] | None = None
+    """Coulomb friction of the ground; the feet have .8, and the coefficient of a
+    contact is the harmonic mean of the two."""
+    stiffness: tuple[float, float] | None = None
+    """Stiffness of the ground, N/m, log-uniform; in series with the feet's 5e4."""
+    payload: tuple[float, float] | None = None
+    """Mass added to the trunk, kg; negative ones make it lighter."""
+    com_shift: tuple[float, float] | None = None
+    """Shift of the trunk's centre of mass along each of its axes, m."""
+    motor_strength: tuple[float, float] | None = None
+    """Torque of each motor over that of its model."""
+    latency: tuple[float, float] | None = None
+    """Delay of the set-points, s, rounded to whole steps of the physics."""
+    push: tuple[float, float] | None = None
+    """Size of pushes: the horizontal velocity, m/s, that the robot would gain as a
+    whole, in any direction; its mass times that is the impulse, spread over .1 s."""
+    push_interval: tuple[float, float] = (1.0, 3.0)
+    """Time from the start, or from one push, to the next, s."""
+    noise: float | None = None
+    """Errors of the sensors, as a multiple of WHITE and BIAS, the standard deviations
+    in loco_drake.tracking.randomization."""
+
+    def check(self) -> None:
+        """Raises InputError unless every range can be drawn from."""
+        for name, least, most in (
+            ("friction", 1e-3, np.inf),
+            ("stiffness", 1.0, np.inf),
+            ("payload", -3.0, np.inf),
+            ("com_shift", -0.2, 0.2),
+            ("motor_strength", 0.5, 1.5),
+            ("latency", 0.0, MAX_LATENCY),
+            ("push", 0.0, np.inf),
+            ("push_interval", PUSH_DURATION, np.inf),
+        ):
+            bounds = getattr(self, name)
+            if bounds is None:
+                continue
+            low, high = bounds
+            if not (least <= low <= high <= most and np.isfinite(high)):
+                limit = f" and at most {most:g}" if np.isfinite(most) else ""
+                raise InputError(
+                    f"The randomization's {name} must be two numbers, the smaller one "
+                    f"first, of at least {least:g}{limit}, not {low:g} and {high:g}."
+                )
+        if self.noise is not None and not (0 <= self.noise < np.inf):
+            raise InputError(
+                f"The randomization's noise must be 0 or more, not {self.noise:g}."
+            )
+
+    def with_standard(self) -> "RandomizationConfig":
+        """Returns a copy in which every part that is off is as in STANDARD."""
+        missing = {
+            part.name: getattr(STANDARD, part.name)
+            for part in fields(self)
+            if getattr(self, part.name) is None
+        }
+        return replace(self, **missing)
+
+    @property
+    def disturbances(self) -> Disturbances:
+        """The systems that a diagram needs for it."""
+        return Disturbances(
+            actuation=self.motor_strength is not None or self.latency is not None,
+            pushes=self.push is not None,
+            sensors=self.noise is not None,
+        )
+
+    @property
+    def changes_physics(self) -> bool:
+        """Whether worlds differ from the model in more than what is measured."""
+        others = {"noise", "push_interval"}
+        return any(
+            getattr(self, part.name) is not None
+            for part in fields(self)
+            if part.name not in others
+        )
+
+    @property
+    def is_off(self) -> bool:
+        """Whether every world is like the model."""
+        return not self.changes_physics and self.noise is None
+
+    def draw(
+        self, robot: Robot, random: np.random.Generator, start: float, end: float
+    ) -> Domain:
+        """Returns a world; parts that are off draw nothing.
+
+        Args:
+            robot: the robot, whose mass says what impulse a push is.
+            random: draws.
+            start: context time at which the episode begins, s.
+            end: and ends.
+        """
+
+        def uniform(bounds: tuple[float, float] | None) -> float | None:
+            return None if bounds is None else float(random.uniform(*bounds))
+
+        return Domain(
+            friction=uniform(self.friction),
+            stiffness=(
+                None
+                if self.stiffness is None
+                else float(np.exp(random.uniform(*np.log(self.stiffness))))
+            ),
+            payload=uniform(self.payload),
+            com_shift=(
+                None if self.com_shift is None else random.uniform(*self.com_shift, 3)
+            ),
+            strength=(
+                None
+                if self.motor_strength is None
+                else random.uniform(*self.motor_strength, 12)
+            ),
+            latency=uniform(self.latency) or 0.0,
+            pushes=self._draw_pushes(robot, random, start, end),
+            sensors=self._draw_errors(random),
+        )
+
+    def _draw_pushes(
+        self, robot: Robot, random: np.random.Generator, start: float, end: float
+    ) -> tuple[Push, ...]:
+        if self.push is None:
+            return ()
+        pushes = []
+        time = start + random.uniform(*self.push_interval)
+        while time < end:
+            begin = round(time / PLAN_DT) * PLAN_DT  # of a control period
+            size, angle = random.uniform(*self.push), random.uniform(-np.pi, np.pi)
+            direction = np.array([np.cos(angle), np.sin(angle), 0.0])
+            force = robot.mass * size / PUSH_DURATION * direction
+            pushes.append(Push(start=begin, duration=PUSH_DURATION, force_W=force))
+            time += random.uniform(*self.push_interval)
+        return tuple(pushes)
+
+    def _draw_errors(self, random: np.random.Generator) -> SensorErrors | None:
+        if self.noise is None:
+            return None
+        return SensorErrors(
+            bias=self.noise * BIAS * random.standard_normal(len(BIAS)),
+            white=self.noise * WHITE,
+            seed=int(random.integers(2**32)),
+        )
+
+
+STANDARD = RandomizationConfig(
+    friction=(0.35, 1.25),
+    stiffness=(2e4, 1e6),
+    payload=(-1.0, 3.0),
+    com_shift=(-0.03, 0.03),
+    motor_strength=(0.85, 1.15),
+    latency=(0.0, 0.02),
+    push=(0.1, 0.8),
+    noise=1.0,
+)

@@ -1,0 +1,37 @@
+"""The page's commands have the options that a result was made with."""
+
+from loco_drake.evaluation.report.commands import commands
+from loco_drake.evaluation.report.results import load_results
+from tests.report_results import tokenizer, tracking, write_results
+
+
+def test_options_follow_the_conditions(tmp_path):
+    lagged = {**tracking("a1"), "contact": "lagged", "time_step_s": 0.002}
+    recorded = {**tracking(), "reference": "retargeted", "duration_s": 4.0}
+    write_results(
+        tmp_path,
+        tracking_go2_generated=tracking(episodes=7),
+        tracking_go2_retargeted=recorded,
+        tracking_a1_lagged=lagged,
+        tracking_a1_pushes=tracking("a1"),
+        tokenizer={"robot": "go2", **tokenizer()},
+    )
+    found = commands(load_results(tmp_path))
+    start = "loco-drake evaluate tracking --robot"
+    assert found["tracking-go2-generated.json"] == f"{start} go2 --seeds 7"
+    assert found["tracking-go2-retargeted.json"] == (
+        f"{start} go2 --reference retargeted --duration 4 --seeds 20"
+    )
+    assert found["tracking-a1-lagged.json"] == (
+        f"{start} a1 --contact lagged --time-step 0.002 --seeds 20"
+    )
+    assert found["tracking-a1-pushes.json"] == f"{start} a1 --pushes --seeds 20"
+    assert found["tokenizer.json"] == "loco-drake evaluate tokenizer --robot all"
+
+
+def test_what_is_missing_has_the_usual_command(tmp_path):
+    write_results(tmp_path, tokenizer={"robot": "go2", **tokenizer()})
+    found = commands(load_results(tmp_path))
+    assert found["tracking-go2-cenic.json"].endswith(
+        "--contact cenic --seeds 2 --duration 4"
+    )

@@ -1,0 +1,91 @@
+"""Whether goals are met, against results made by hand."""
+
+import math
+
+import pytest
+
+from loco_drake.evaluation.report.goal import BEST, MET, MISSED, UNKNOWN
+from loco_drake.evaluation.report.goals import GOALS
+from loco_drake.evaluation.report.results import load_results
+from loco_drake.evaluation.report.scoreboard import counts, scoreboard
+from tests.report_results import (
+    learning,
+    retargeting,
+    tokenizer,
+    tracking,
+    write_results,
+)
+
+
+def score(folder, title, robot="go2"):
+    """Text, note and verdict of the first goal whose title begins so."""
+    parts = scoreboard(load_results(folder)).values()
+    lines = [line for part in parts for line in part]
+    line = next(line for line in lines if line.goal.title.startswith(title))
+    found = line.scores[("go2", "a1").index(robot)]
+    return found.cell.text, found.cell.note, found.verdict
+
+
+@pytest.mark.parametrize(
+    ("slip", "moved", "verdict"),
+    [
+        (0.0099, 0.0299, BEST),
+        (0.0101, 0.0299, MET),
+        (0.0301, 0.0001, MISSED),
+        (0.0001, 0.0301, MISSED),
+    ],
+)
+def test_slip_is_not_bought_with_corrections(tmp_path, slip, moved, verdict):
+    figures = retargeting(stance_slip_median_mps=slip, correction_rmse_m=moved)
+    write_results(tmp_path, retargeting={"robots": {"go2": figures}})
+    text, note, found = score(tmp_path, "slip of feet")
+    assert (text, found) == (f"{slip:.4f}", verdict)
+    assert f"{1000 * moved:.1f} mm" in note
+
+
+@pytest.mark.parametrize(
+    ("title", "text", "verdict"),
+    [
+        ("normalized return, mean", "77.0", MISSED),
+        ("normalized return, worst", "60.0", MISSED),
+        ("episodes that end", "1.5", MET),
+        ("joint error of the robot", f"{math.degrees(0.03):.1f}", MET),
+        ("position error", "4.4", MISSED),
+        ("orientation error", f"{math.degrees(0.05):.1f}", MISSED),
+        ("stretch", "1.021", MET),
+        ("whole diagram", "6.5", MET),
+    ],
+)
+def test_tracking_in_the_units_of_the_goals(tmp_path, title, text, verdict):
+    write_results(tmp_path, tracking_go2_generated=tracking())
+    assert score(tmp_path, title)[::2] == (text, verdict)
+
+
+def test_scores_come_with_their_price(tmp_path):
+    write_results(tmp_path, tracking_go2_generated=tracking())
+    assert score(tmp_path, "normalized return, mean")[1] == "at stretch 1.021"
+    assert score(tmp_path, "normalized return, worst")[1] == "dog-trot"
+
+
+@pytest.mark.parametrize(
+    ("result", "verdict"), [(89.9, MISSED), (90.1, BEST), (None, MISSED)]
+)
+def test_steps_count_only_for_the_return_that_they_are_for(tmp_path, result, verdict):
+    write_results(tmp_path, learning_go2=learning())
+    if result is not None:
+        figures = tracking(normalized_return=result)
+        write_results(tmp_path, tracking_go2_generated=figures)
+    text, _, found = score(tmp_path, "steps of training")
+    assert (text, found) == ("4.5", verdict)
+    assert score(tmp_path, "time of training")[::2] == ("2.0", MET)
+
+
+def test_what_was_not_measured_is_neither_met_nor_missed(tmp_path):
+    robots = {"go2": tokenizer(), "a1": tokenizer(joint_rmse_rad=None)}
+    write_results(tmp_path, tokenizer={"robots": robots})
+    assert score(tmp_path, "joint error, rec")[::2] == ("0.0271", MET)
+    assert score(tmp_path, "toe error")[::2] == ("16.3", MISSED)
+    assert score(tmp_path, "joint error, rec", "a1")[::2] == ("–", UNKNOWN)
+    counted = counts(scoreboard(load_results(tmp_path)))
+    assert counted["go2"] == {"met": 2, "measured": 3, "goals": len(GOALS)}
+    assert counted["a1"] == {"met": 1, "measured": 2, "goals": len(GOALS)}

@@ -1,0 +1,39 @@
+"""Tables: numbers as text, columns, and why an entry is missing."""
+
+from pathlib import Path
+
+import pytest
+
+from loco_drake.evaluation.report.results import Figures
+from loco_drake.evaluation.report.tables import Column, label_table, number
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (0.98765, 3, "0.988"),
+        (0.0, 3, "0"),
+        (4e-15, 2, "< 0.01"),
+        (1059.4, 0, "1059"),
+        (12345.6, 0, "12,346"),
+        (-0.5, 1, "-0.5"),
+    ],
+)
+def test_numbers(value, digits, text):
+    assert number(value, digits) == text
+
+
+def test_labels_in_order_and_all_last_with_reasons():
+    figures = {
+        "labels": {
+            "solo8-wave": {"slip": 0.0034, "reason": "unused"},
+            "dog-trot": {"slip": None, "reason": "no toe ever stands"},
+            "dog-spin": {"slip": 1.0},
+        },
+        "all": {"slip": 0.0056},
+    }
+    columns = [Column("slip, mm/s", "slip", 1000, 1)]
+    table = label_table("title", columns, Figures(figures, Path("f.json")))
+    assert [row.title for row in table.rows] == ["dog-trot", "solo8-wave", "all"]
+    assert [row.cells[0].text for row in table.rows] == ["–", "3.4", "5.6"]
+    assert table.reasons == ["dog-trot: no toe ever stands"]

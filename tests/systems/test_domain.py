@@ -1,0 +1,336 @@
+"""Each part of a domain against what physics says."""
+
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
+from pydrake.multibody.tree import PdControllerGains
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from loco_drake.models.plant import CONTACTS, ConfigureSimulator, PlantConfig
+from loco_drake.models.robots import AddRobotModel
+from loco_drake.systems.diagram import MakeLocomotionDiagram
+from loco_drake.systems.domain import Domain, Push, SensorErrors, SetDomain
+from loco_drake.systems.plan import PLAN_DT
+from loco_drake.systems.scenario import (
+    Disturbances,
+    ExternalAction,
+    LoadScenario,
+    PlanReference,
+    Scenario,
+)
+
+GRAVITY = 9.81
+GO2_MASS, GO2_TRUNK = 16.085, 7.277  # kg, as in its URDF
+FAR_UP = 50.0  # m
+
+
+class Standing:
+    """A robot that is to stand still, in a domain; ``action`` moves its set-points."""
+
+    def __init__(self, robot, domain, plant=None, height=0.0):
+        plant = plant or PlantConfig()
+        diagram = MakeLocomotionDiagram(
+            Scenario(
+                robot=robot.name,
+                plant=plant,
+                reference=PlanReference(),
+                smoother=None,
+                policy=ExternalAction(),
+                disturbances=Disturbances(actuation=True, pushes=True, sensors=True),
+            )
+        )
+        self.diagram = diagram
+        self.simulator = Simulator(diagram)
+        ConfigureSimulator(self.simulator, plant)
+        self.context = self.simulator.get_mutable_context()
+        self.plant = diagram.GetSubsystemByName("plant")
+        self.plant_context = self.plant.GetMyMutableContextFromRoot(self.context)
+        action = diagram.GetInputPort("action").FixValue(self.context, np.zeros(12))
+        self._action = action.GetMutableData().get_mutable_value()
+        SetDomain(diagram, self.context, domain)
+        q = self.plant.GetPositions(self.plant_context).copy()
+        q[6] += height
+        self.plant.SetPositions(self.plant_context, q)
+        self.simulator.Initialize()
+
+    def act(self, value):
+        self._action.set_value(np.full(12, value))
+
+    def advance(self, time):
+        self.simulator.AdvanceTo(time)
+        return self.state
+
+    @property
+    def state(self):
+        return self.plant.GetPositionsAndVelocities(self.plant_context).copy()
+
+    def slide(self, speed):
+        """Gives all of the robot a speed along x."""
+        v = self.plant.GetVelocities(self.plant_context).copy()
+        v[3] += speed
+        self.plant.SetVelocities(self.plant_context, v)
+
+    @property
+    def momentum(self):
+        return self.plant.CalcSpatialMomentumInWorldAboutPoint(
+            self.plant_context, np.zeros(3)
+        ).translational()
+
+    @property
+    def contacts(self):
+        """Forces on the robot (N, 3), their points in the world, and depths (N,)."""
+        results = self.plant.get_contact_results_output_port().Eval(self.plant_context)
+        infos = [
+            results.point_pair_contact_info(i)
+            for i in range(results.num_point_pair_contacts())
+        ]
+        ground = self.plant.world_body().index()
+        forces = [
+            info.contact_force() * (1 if info.bodyA_index() == ground else -1)
+            for info in infos
+        ]
+        depths = [info.point_pair().depth for info in infos]
+        points = [info.contact_point() for info in infos]
+        return np.array(forces).reshape(-1, 3), np.array(points), np.array(depths)
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_sliding_feet_are_held_back_by_coulombs_friction(go2, contact):
+    """Ground of .1 under feet of .8: the harmonic mean is 2 (.08) / .9 = .178."""
+    robot = Standing(go2, Domain(friction=0.1), PlantConfig(contact=contact))
+    robot.advance(0.3)
+    robot.slide(0.5)
+    impulse = np.zeros(3)
+    for k in range(31, 41):
+        robot.advance(k * 0.01)
+        impulse += robot.contacts[0].sum(axis=0)
+    assert impulse[2] > 0.08 * GO2_MASS * GRAVITY / 0.01
+    assert -impulse[0] / impulse[2] == pytest.approx(0.16 / 0.9, rel=0.03)
+
+
+def test_a_payload_weighs_on_the_feet(go2):
+    robot = Standing(go2, Domain(payload=3.0))
+    robot.advance(4.0)
+    total = robot.contacts[0][:, 2].sum()
+    assert total == pytest.approx((GO2_MASS + 3.0) * GRAVITY, rel=1e-4)
+
+
+def test_a_shifted_trunk_shifts_the_centre_of_pressure(go2):
+    """By 7.277 kg of 16.085 kg times 3 cm, as seen from the trunk, which sways."""
+
+    def centre(shift):
+        robot = Standing(go2, Domain(com_shift=shift))
+        robot.advance(2.0)
+        forces, points, _ = robot.contacts
+        return forces[:, 2] @ points[:, :2] / forces[:, 2].sum() - robot.state[4:6]
+
+    moved = centre(np.array([0.03, -0.02, 0.0])) - centre(np.zeros(3))
+    expected = np.array([0.03, -0.02]) * GO2_TRUNK / GO2_MASS
+    np.testing.assert_allclose(moved, expected, rtol=0.02)
+
+
+def test_soft_ground_is_a_spring_in_series_with_the_feet(go2):
+    """Two of 5e4 N/m give 2.5e4."""
+    robot = Standing(go2, Domain(stiffness=5e4))
+    robot.advance(2.0)
+    forces, _, depths = robot.contacts
+    np.testing.assert_allclose(forces[:, 2] / depths, 2.5e4, rtol=0.01)
+
+
+@pytest.mark.parametrize("contact", ["similar", "cenic"])
+def test_a_push_changes_the_momentum_by_force_times_duration(go2, contact):
+    """In the air, where nothing else acts along x and y."""
+    pushes = (
+        Push(start=0.1, duration=0.1, force_W=np.array([40.0, -20.0, 0.0])),
+        Push(start=0.16, duration=0.1, force_W=np.array([0.0, 10.0, 0.0])),
+    )
+    plant = PlantConfig(contact=contact)
+    robot = Standing(go2, Domain(pushes=pushes), plant, height=FAR_UP)
+    robot.advance(0.1)
+    np.testing.assert_allclose(robot.momentum[:2], 0.0, atol=0.01)
+    robot.advance(0.14)
+    np.testing.assert_allclose(robot.momentum[:2], [1.6, -0.8], atol=0.01)
+    robot.advance(0.3)
+    np.testing.assert_allclose(robot.momentum[:2], [4.0, -1.0], atol=0.01)
+
+
+@pytest.mark.parametrize("contact", ["similar", "lagged", "sap"])
+def test_late_motors_answer_late_by_exactly_so_many_steps(go2, contact):
+    """20 ms late, and told one control period earlier: the same, to the last bit."""
+
+    def run(latency, sample):
+        robot = Standing(go2, Domain(latency=latency), PlantConfig(contact=contact))
+        states = []
+        for k in range(15):
+            robot.act(0.5 if k >= sample else 0.0)
+            states.append(robot.advance((k + 1) * PLAN_DT))
+        return np.array(states)
+
+    np.testing.assert_array_equal(run(0.02, 5), run(0.0, 6))
+    assert (run(0.02, 6) != run(0.0, 6)).any()
+
+
+@pytest.mark.parametrize("contact", ["similar", "cenic"])
+@pytest.mark.parametrize("steps", [0, 1, 3])
+def test_a_step_of_the_action_moves_the_joints_that_many_steps_later(
+    go2, contact, steps
+):
+    plant = PlantConfig(contact=contact, time_step=0.005)
+    domain = Domain(latency=steps * plant.time_step)
+    told, other = (Standing(go2, domain, plant, height=FAR_UP) for _ in range(2))
+    for robot in (told, other):
+        robot.advance(0.1)
+    told.act(1.0)
+    moved = []
+    for k in range(1, 7):
+        time = (20 + k) * plant.time_step
+        change = told.advance(time) - other.advance(time)
+        moved.append(bool(np.abs(change).max() > 0.01))
+    assert moved == [k > steps for k in range(1, 7)]
+
+
+def test_weak_motors_hold_with_their_share_of_the_torque(go2):
+    """Standing at .8, from the actuators themselves."""
+    robot = Standing(go2, Domain(strength=np.full(12, 0.8)))
+    robot.advance(3.0)
+    targets = robot.diagram.GetSubsystemByName("joint_targets")
+    q_d = targets.GetOutputPort("desired_state").Eval(
+        targets.GetMyContextFromRoot(robot.context)
+    )[:12]
+    q, v = robot.state[7:19], robot.state[25:]
+    asked = go2.kp * (q_d - q) - go2.kd * v
+    given = robot.diagram.GetOutputPort("net_actuation").Eval(robot.context)
+    assert np.abs(asked).max() > 3.0
+    np.testing.assert_allclose(given, 0.8 * asked, atol=0.02)
+
+
+@pytest.mark.parametrize("strength", [0.8, 1.2])
+@pytest.mark.parametrize("contact", ["similar", "lagged", "sap"])
+def test_joints_move_as_with_gains_that_much_lower(go2, contact, strength):
+    """In the air, against a plant whose gains were scaled before it was finalized."""
+    plant = PlantConfig(contact=contact)
+    domain = Domain(strength=np.full(12, strength))
+    robot = Standing(go2, domain, plant, height=FAR_UP)
+    ours = []
+    for k in range(25):
+        robot.act(np.sin(0.7 * k))
+        ours.append(robot.advance((k + 1) * PLAN_DT))
+    theirs = _with_scaled_gains(go2, contact, strength)
+    nominal = _with_scaled_gains(go2, contact, 1.0)
+    np.testing.assert_allclose(ours, theirs, atol=1e-6)
+    assert np.abs(theirs - nominal).max() > 0.1
+
+
+def _with_scaled_gains(go2, contact, strength):
+    """States (25, 37) of a robot in the air, sent the set-points of the test above."""
+    builder = DiagramBuilder()
+    config = MultibodyPlantConfig(
+        time_step=0.01,
+        discrete_contact_approximation=contact,
+        use_sampled_output_ports=False,
+    )
+    plant, _ = AddMultibodyPlant(config, builder)
+    instance = AddRobotModel(Parser(plant), go2.name, visual=False)
+    for index in plant.GetJointActuatorIndices():
+        gains = plant.get_joint_actuator(index).get_controller_gains()
+        plant.get_joint_actuator(index).set_controller_gains(
+            PdControllerGains(p=strength * gains.p, d=strength * gains.d)
+        )
+    plant.Finalize()
+    simulator = Simulator(builder.Build())
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    q = [1, 0, 0, 0, 0, 0, go2.stand_height + FAR_UP, *go2.stand_joints]
+    plant.SetPositions(context, q)
+    port = plant.get_desired_state_input_port(instance).FixValue(context, np.zeros(24))
+    targets = _standing_set_points(go2)
+    states = []
+    for k in range(25):
+        desired = targets + 0.15 * np.sin(0.7 * k)
+        port.GetMutableData().get_mutable_value().set_value([*desired, *np.zeros(12)])
+        simulator.AdvanceTo((k + 1) * PLAN_DT)
+        states.append(plant.GetPositionsAndVelocities(context).copy())
+    return np.array(states)
+
+
+def _standing_set_points(go2):
+    robot = Standing(go2, Domain(), height=FAR_UP)
+    robot.advance(0.01)
+    return robot.diagram.GetOutputPort("desired_state").Eval(robot.context)[:12]
+
+
+def test_a_domain_like_the_model_changes_nothing(go2):
+    """The systems are there and do nothing: the same states, to the last bit."""
+    plain = MakeLocomotionDiagram(
+        Scenario(reference=PlanReference(), smoother=None, policy=ExternalAction())
+    )
+    for name in ("actuation", "pushes", "sensors"):
+        assert not plain.HasSubsystemNamed(name)
+    simulator = Simulator(plain)
+    context = simulator.get_mutable_context()
+    plain.GetInputPort("action").FixValue(context, np.full(12, 0.5))
+    simulator.AdvanceTo(0.5)
+    robot = Standing(go2, Domain())
+    robot.act(0.5)
+    robot.advance(0.5)
+    for name in ("state", "observation", "net_actuation"):
+        np.testing.assert_array_equal(
+            plain.GetOutputPort(name).Eval(context),
+            robot.diagram.GetOutputPort(name).Eval(robot.context),
+        )
+
+
+@pytest.mark.parametrize(
+    ("name", "domain"),
+    [
+        ("actuation", Domain(latency=0.02)),
+        ("actuation", Domain(strength=np.ones(12))),
+        ("pushes", Domain(pushes=(Push(start=0, duration=1, force_W=np.ones(3)),))),
+        (
+            "sensors",
+            Domain(sensors=SensorErrors(bias=np.ones(36), white=np.ones(36), seed=0)),
+        ),
+    ],
+)
+def test_a_diagram_without_the_system_is_refused(name, domain):
+    text = "disturbances: {actuation: true, pushes: true, sensors: true}"
+    scenario = LoadScenario(
+        data="{reference: !PlanReference {}, policy: !ExternalAction {}}", overlay=text
+    )
+    diagram = MakeLocomotionDiagram(scenario)
+    SetDomain(diagram, diagram.CreateDefaultContext(), domain)
+    setattr(scenario.disturbances, name, False)
+    lacking = MakeLocomotionDiagram(scenario)
+    with pytest.raises(ValueError, match=f"with the system {name}"):
+        SetDomain(lacking, lacking.CreateDefaultContext(), domain)
+
+
+def test_all_of_it_is_in_the_context(go2):
+    """A clone goes on as the original does, and the defaults bring the model back."""
+    domain = Domain(
+        friction=0.5,
+        stiffness=1e5,
+        payload=2.0,
+        com_shift=np.array([0.02, 0.0, 0.0]),
+        strength=np.linspace(0.9, 1.1, 12),
+        latency=0.02,
+        pushes=(Push(start=0.2, duration=0.1, force_W=np.array([60.0, 0, 0])),),
+    )
+    robot = Standing(go2, domain)
+    robot.act(0.5)
+    robot.advance(0.13)
+    clone = Simulator(robot.diagram, robot.context.Clone())
+    clone.AdvanceTo(0.5)
+    robot.advance(0.5)
+    port = robot.diagram.GetOutputPort("state")
+    first = port.Eval(robot.context).copy()
+    np.testing.assert_array_equal(first, port.Eval(clone.get_context()))
+
+    robot.diagram.SetDefaultContext(robot.context)
+    robot.context.SetTime(0.0)
+    robot.simulator.Initialize()
+    like_the_model = Standing(go2, Domain())
+    like_the_model.act(0.5)
+    np.testing.assert_array_equal(robot.advance(0.5), like_the_model.advance(0.5))
+    assert (robot.state != first).any()
