@@ -79,8 +79,8 @@ def export_onnx(actor: Actor, robot: Robot, path: Path) -> dict[str, str]:
         import onnxscript  # noqa: F401 (torch exports with it)
     except ImportError:
         raise InputError(
-            "To export to ONNX, install the packages onnx and onnxscript: "
-            "pip install 'loco_drake[onnx]'."
+            "To export to ONNX, install the packages onnx and onnxscript, the extra "
+            "'onnx' of loco_drake."
         ) from None
     # It tells of operators of packages that are not installed.
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)

@@ -99,7 +99,7 @@ def test_without_the_extra_one_sentence_says_what_to_install(
     out = tmp_path / "policy.onnx"
     assert main(["export", "--out", str(out)]) == 2
     assert capsys.readouterr().err == (
-        "loco-drake: To export to ONNX, install the packages onnx and onnxscript: "
-        "pip install 'loco_drake[onnx]'.\n"
+        "loco-drake: To export to ONNX, install the packages onnx and onnxscript, the "
+        "extra 'onnx' of loco_drake.\n"
     )
     assert list(tmp_path.iterdir()) == []
