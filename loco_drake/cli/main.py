@@ -32,6 +32,7 @@ _COMMANDS = {
         "TrainClassifier",
         "what tells gaits apart, to judge generated motion",
     ),
+    "export": ("export", "Export", "the policy as ONNX"),
     "evaluate retargeting": (
         "evaluate_retargeting",
         "EvaluateRetargeting",

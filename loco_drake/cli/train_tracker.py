@@ -47,6 +47,8 @@ class TrainTracker:
     """Processes that simulate."""
     per_worker: int = 8
     """Environments in each process."""
+    batch: int = PpoConfig.batch
+    """Environment steps between updates; what is saved lags no more behind."""
     plant: PlantConfig = field(default_factory=PlantConfig)
     """Contact solver, time step and friction."""
     randomize: bool = False
@@ -72,6 +74,12 @@ class TrainTracker:
         for name in ("steps", "workers", "per_worker"):
             if getattr(self, name) < 1:
                 raise InputError(f"{name} must be at least 1.")
+        environments = self.workers * self.per_worker
+        if self.batch < 2 * environments:
+            raise InputError(
+                f"--batch must be at least {2 * environments}, two steps of each of "
+                f"{environments} environments, not {self.batch}."
+            )
         self.plant.check()
         randomization = self.randomization
         if self.randomize:
@@ -89,7 +97,11 @@ class TrainTracker:
             per_worker=self.per_worker,
             seed=self.seed,
             environment=environment,
-            ppo=PpoConfig(privileged=self.privileged),
+            ppo=PpoConfig(
+                batch=self.batch,
+                minibatch=min(self.batch, PpoConfig.minibatch),
+                privileged=self.privileged,
+            ),
         )
         # A second thread gains little, and spins where another program has its core.
         torch.set_num_threads(1)

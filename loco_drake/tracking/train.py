@@ -85,8 +85,8 @@ def train_tracker(
 
     Writes to ``folder`` after each batch: ``checkpoint.safetensors``, with which
     training can be resumed, ``policy.safetensors``, which the diagram loads,
-    ``progress.jsonl`` and TensorBoard logs. An interruption (Ctrl-C) loses at most the
-    batch being collected.
+    ``progress.jsonl`` and TensorBoard logs. An interruption (Ctrl-C), or being killed,
+    loses at most the batch being collected.
 
     Args:
         plans: what to follow.
@@ -105,6 +105,7 @@ def train_tracker(
         InputError: if there is nothing to resume or to begin with, or what there is was
             trained with other networks or observations, or, to resume, for another
             robot.
+        ChildProcessError: if a worker process is killed.
     """
     folder = Path(folder)
     fixed = {
@@ -122,6 +123,8 @@ def train_tracker(
     if first is not None:
         beginning = _load(first, {"hidden": config.ppo.hidden})
     folder.mkdir(parents=True, exist_ok=True)
+    for unfinished in folder.glob(".*.safetensors"):
+        unfinished.unlink()  # what a training was writing when it was killed
 
     start = time.monotonic()
     steps_before = 0 if saved is None else int(saved["steps"])

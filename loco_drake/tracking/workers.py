@@ -19,6 +19,8 @@ from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
 from loco_drake.tracking.sampler import PlanSampler
 
+_DIED = "A worker process died; training goes on from its checkpoint with --resume."
+
 
 def _work(
     pipe: Connection,
@@ -80,6 +82,9 @@ class WorkerVecEnv(VecEnv):
         workers: processes.
         per_worker: environments in each; many amortise pipes and inference.
         seed: of the environments' own randomness.
+
+    Raises:
+        ChildProcessError: from stepping, if a worker process was killed.
     """
 
     render_mode: str | None = None  # VecEnv asks for it
@@ -180,7 +185,7 @@ class WorkerVecEnv(VecEnv):
                     (None if actions is None else actions[own], self._next_plans[own])
                 )
             except (BrokenPipeError, OSError):
-                raise RuntimeError("a worker process died") from None
+                raise ChildProcessError(_DIED) from None
 
     def _receive(self) -> list[Any]:
         results: list[Any] = []
@@ -188,7 +193,7 @@ class WorkerVecEnv(VecEnv):
             try:
                 results.append(pipe.recv())
             except (EOFError, ConnectionResetError):
-                raise RuntimeError("a worker process died") from None
+                raise ChildProcessError(_DIED) from None
         return results
 
     # What VecEnv asks for beyond stepping; the environments are in other processes.

@@ -102,6 +102,10 @@ WRONG = {
     "simulate --policy FILES/cut.safetensors": "cut.safetensors is damaged",
     "simulate --policy FILES/cut_tokenizer.safetensors": "is damaged",
     "simulate --policy FILES/policy_of_a1.safetensors": "another robot: a1, not go2",
+    "export --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
+    "export --out policy.txt": "--out must end in .onnx, not 'policy.txt'",
+    "export --policy FILES/none.safetensors": "There are no policy weights at",
+    "export --policy FILES/policy_of_a1.safetensors": "another robot: a1, not go2",
     "generate --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
     "generate --gait fly": f"Unknown gait 'fly'; the choices are {GAITS}",
     "generate --gait dog-pace,fly@2": f"Unknown gait 'fly'; the choices are {GAITS}",
@@ -157,6 +161,7 @@ WRONG = {
     "report --replay-seconds 0": DURATION,
     "report --seed -1": "--seed must be 0 or more, not -1",
     "train tracker --references FILES/empty --robot spot": "the choices are go2, a1",
+    "train tracker --references FILES/empty --batch 9": "--batch must be at least 32",
     "train tracker --references FILES/empty --steps 0": "steps must be at least 1",
 }
 

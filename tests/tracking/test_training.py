@@ -196,7 +196,7 @@ def test_a_killed_worker_is_reported(plans):
         workers.reset()
         os.kill(workers._processes[0].pid, signal.SIGKILL)
         workers._processes[0].join()
-        with pytest.raises(RuntimeError, match="worker process died"):
+        with pytest.raises(ChildProcessError, match="worker process died"):
             workers.step(np.zeros((1, 12), dtype=np.float32))
     finally:
         workers.close()

@@ -1,0 +1,43 @@
+"""``loco-drake export``: the policy as an ONNX file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from loco_drake.cli.output import print_table, write_json
+from loco_drake.errors import InputError
+from loco_drake.models.robots import get_robot
+from loco_drake.systems.actor import load_actor
+from loco_drake.systems.pretrained import policy_path
+from loco_drake.tracking.onnx_policy import export_onnx
+
+
+@dataclass(kw_only=True)
+class Export:
+    """Write the policy as ONNX: from raw observations to actions, with all it needs."""
+
+    robot: str = "go2"
+    """Robot: go2 or a1."""
+    policy: Path | None = None
+    """Weights of the policy; default: those that come with the package."""
+    out: Path = Path("policy.onnx")
+    """File to write."""
+    json: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
+    """Write the metadata to a file."""
+    seed: int = 0
+    """As in every command; nothing here is random."""
+
+    def run(self) -> int:
+        """Writes and prints; returns the exit status."""
+        robot = get_robot(self.robot)
+        if self.out.suffix != ".onnx":
+            raise InputError(f"--out must end in .onnx, not {str(self.out)!r}.")
+        actor = load_actor(self.policy or policy_path(robot), robot)
+        metadata = export_onnx(actor, robot, self.out)
+        write_json(self.json, metadata)
+        shown = [(name, metadata[name]) for name in ("robot", "labels", "rate")]
+        size = f"{self.out.stat().st_size / 1e3:.0f} kB"
+        print_table(str(self.out), ("of the policy", ""), [*shown, ("size", size)])
+        return 0

@@ -1,0 +1,101 @@
+"""The policy as an ONNX file, to be run without torch and without this package."""
+
+import json
+import logging
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from loco_drake import __version__
+from loco_drake.datasets.registry import DATASETS
+from loco_drake.errors import InputError
+from loco_drake.files import atomic_path
+from loco_drake.gaits import parse_label
+from loco_drake.models.robots import Robot
+from loco_drake.systems.actor import Actor
+from loco_drake.systems.observation import OBSERVATION_SIZE
+
+SET_POINTS = (
+    "every 1 / rate s: q_d = q + (kd v + tau) / kp + action_scale * action, v_d = 0; "
+    "q, v and the feed-forward torques tau are the plan's one period later; the motors "
+    "give kp (q_d - q_measured) - kd v_measured"
+)
+
+
+def policy_metadata(actor: Actor, robot: Robot) -> dict[str, str]:
+    """Returns what is needed to run a policy, as ONNX metadata: strings, or JSON.
+
+    - kind, robot, labels; rate in Hz
+    - observation_layout: names and sizes of the parts of the observation, in order;
+      :mod:`loco_drake.systems.observation` says what they are
+    - joint_names in the order of the action; standing_joints (rad), which joint
+      positions are observed from; kp (Nm/rad) and kd (Nm s/rad) of the joints' PD
+    - action_scale (rad) and set_points: what becomes of an action
+    - licence: of the recordings that the policy was learned from
+    """
+    config = actor.config
+    sources = dict.fromkeys(parse_label(label).source for label in config.labels)
+    licences = "; ".join(
+        f"{source}: {DATASETS[source].licence}, {DATASETS[source].attribution}"
+        for source in sources
+    )
+    values: dict[str, Any] = {
+        "kind": "loco_drake policy",
+        "version": __version__,
+        "robot": robot.name,
+        "labels": config.labels,
+        "rate": config.rate,
+        "observation_layout": config.observation_layout,
+        "joint_names": list(robot.joint_names),
+        "standing_joints": robot.stand_joints.tolist(),
+        "kp": robot.kp.tolist(),
+        "kd": robot.kd.tolist(),
+        "action_scale": config.action_scale,
+        "set_points": SET_POINTS,
+        "licence": "The weights are under the conditions of the recordings that they "
+        f"were learned from, not under the code's licence. {licences}",
+    }
+    return {
+        name: value if isinstance(value, str) else json.dumps(value)
+        for name, value in values.items()
+    }
+
+
+def export_onnx(actor: Actor, robot: Robot, path: Path) -> dict[str, str]:
+    """Writes a policy as ONNX; returns its metadata.
+
+    The network takes "observation" (N, OBSERVATION_SIZE) as it is observed and returns
+    "action" (N, 12), in 32 bits, for any N: normalization, clipping and the mean over
+    the observation and its mirror image are within.
+
+    Raises:
+        InputError: if the packages of the extra ``onnx`` are not installed.
+    """
+    try:
+        import onnx
+        import onnxscript  # noqa: F401 (torch exports with it)
+    except ImportError:
+        raise InputError(
+            "To export to ONNX, install the packages onnx and onnxscript: "
+            "pip install 'loco_drake[onnx]'."
+        ) from None
+    # It tells of operators of packages that are not installed.
+    logging.getLogger("torch.onnx").setLevel(logging.ERROR)
+    program = torch.onnx.export(
+        actor.eval(),
+        (torch.zeros(2, OBSERVATION_SIZE),),
+        dynamo=True,
+        verbose=False,
+        input_names=["observation"],
+        output_names=["action"],
+        dynamic_shapes={"observation": {0: torch.export.Dim("robots")}},
+    )
+    assert program is not None
+    model = program.model_proto
+    metadata = policy_metadata(actor, robot)
+    onnx.helper.set_model_props(model, metadata)
+    onnx.checker.check_model(model)
+    with atomic_path(Path(path)) as temporary:
+        onnx.save(model, temporary)
+    return metadata

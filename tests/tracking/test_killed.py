@@ -1,0 +1,125 @@
+"""Trainings that end by SIGKILL: ``loco-drake train tracker`` as people run it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from loco_drake.models.robots import get_robot
+from loco_drake.motion import save_motion
+from loco_drake.systems.actor import load_actor
+from loco_drake.tracking.checkpoint import load_checkpoint
+from tests.synthetic_motion import synthetic_motion
+
+COMMAND = "from loco_drake.cli.main import main; raise SystemExit(main())"
+BATCH = 64
+
+
+@pytest.fixture(scope="module")
+def references(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("references")
+    save_motion(synthetic_motion("dog-trot", 2.0, 0.3), folder / "trot.npz")
+    return folder
+
+
+def train(references, out, *arguments):
+    """Starts a training of two environments a worker."""
+    options = {"references": references, "out": out, "per-worker": 2, "batch": BATCH}
+    line = [f"--{name}={value}" for name, value in options.items()]
+    return subprocess.Popen(
+        [sys.executable, "-c", COMMAND, "train", "tracker", *line, *arguments],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def wait_for_batches(process, out, count):
+    """Waits until so many batches were learned from; the last may not be saved yet."""
+    log, deadline = out / "progress.jsonl", time.monotonic() + 200
+    while not log.exists() or len(log.read_text().splitlines()) < count:
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def workers_of(process):
+    """Process ids of the workers of a training."""
+    found = subprocess.run(
+        ["pgrep", "-P", str(process.pid), "-f", "spawn_main"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return [int(pid) for pid in found.stdout.split()]
+
+
+def runs(pid):
+    """Whether there is such a process, other than as a zombie."""
+    state = subprocess.run(
+        ["ps", "-o", "stat=", "-p", str(pid)],
+        capture_output=True,
+        text=True,
+        check=False,
+    ).stdout.strip()
+    return state != "" and not state.startswith("Z")
+
+
+def check_whole(out):
+    """Checkpoint and policy can be read; returns the checkpoint's steps."""
+    _, header = load_checkpoint(out / "checkpoint.safetensors")
+    load_actor(out / "policy.safetensors", get_robot("go2"))
+    return header["state"]["steps"]
+
+
+def test_a_killed_training_goes_on_from_its_last_checkpoint(references, tmp_path):
+    out, figures = tmp_path / "run", tmp_path / "figures.json"
+    first = train(references, out, "--workers=1", "--steps=1000000")
+    wait_for_batches(first, out, 3)
+    workers = workers_of(first)
+    first.send_signal(signal.SIGKILL)
+    first.communicate(timeout=30)
+    assert len(workers) == 1
+    deadline = time.monotonic() + 30
+    while any(runs(pid) for pid in workers):  # they notice that the trainer is gone
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+    steps = check_whole(out)
+    assert steps >= 2 * BATCH
+    assert steps % BATCH == 0
+    # What a training that is killed while it saves leaves behind.
+    (out / ".checkpoint.x1y2.safetensors").write_bytes(b"half")
+    resume = ("--workers=1", "--resume", f"--steps={steps + 2 * BATCH}")
+    second = train(references, out, *resume, f"--json={figures}")
+    _, error = second.communicate(timeout=200)
+    assert second.returncode == 0, error
+    assert check_whole(out) == steps + 2 * BATCH
+    assert json.loads(figures.read_text())["steps"] == steps + 2 * BATCH
+    assert not list(out.glob(".*"))
+    # A batch is logged when the next begins, whole lines only.
+    lines = (out / "progress.jsonl").read_text().splitlines()
+    logged = {json.loads(line)["steps"] for line in lines}
+    assert logged == set(range(BATCH, steps + 2 * BATCH, BATCH))
+
+
+def test_a_killed_worker_ends_training_in_one_sentence(references, tmp_path):
+    out = tmp_path / "run"
+    process = train(references, out, "--workers=2", "--steps=1000000")
+    wait_for_batches(process, out, 2)
+    workers = workers_of(process)
+    assert len(workers) == 2
+    os.kill(workers[1], signal.SIGKILL)
+    _, error = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert error == (
+        "loco-drake: A worker process died; training goes on from its checkpoint "
+        "with --resume.\n"
+    )
+    assert not runs(workers[0])
+    assert check_whole(out) >= BATCH
+    assert not list(out.glob(".*"))
