@@ -85,6 +85,22 @@ def test_pairs_of_legs_of_the_gaits():
         assert with_fl[partner] > 0.4
 
 
+@pytest.mark.parametrize("label", ["dog-pace", "horse-walk", "solo8-trot"])
+def test_a_faster_pace_is_faster_and_is_kept(label):
+    """Speeds rise with the rank, and a motion stays within those of its label."""
+    model = pretrained_motion_model("go2")
+    speeds = []
+    for pace in (0.05, 0.5, 0.95):
+        motions = generate_motions(model, parse_label(label), 8.0, range(4), pace=pace)
+        speeds.append(np.mean([forward_speed(model.robot, m) for m in motions]))
+    edges = model.generator.speed_edges[parse_label(label).index].numpy()
+    edges = edges.astype(float) * model.robot.stand_height
+    assert speeds[0] < speeds[1] < speeds[2]
+    assert speeds[0] < edges[6]
+    assert edges[4] < speeds[1] < edges[10]
+    assert edges[8] < speeds[2]
+
+
 # To brake from 1.5 m/s to .4 takes a little more than trotting does.
 CHANGES = {
     "dog-pace,dog-trot@4,dog-gallop@8": 1.1,
@@ -123,7 +139,7 @@ def test_gaits_change_without_a_jump_and_within_a_second(text):
 
 
 def test_a_pace_is_a_trot_by_its_legs_a_second_after_the_change():
-    """The left front leg swings with the left rear one, then with the right rear one."""
+    """The left front leg swings with the left rear one, then with the right one."""
     model, schedule = (
         pretrained_motion_model("go2"),
         parse_schedule("dog-pace,dog-trot@4"),
