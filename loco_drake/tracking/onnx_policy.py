@@ -13,7 +13,7 @@ from loco_drake.errors import InputError
 from loco_drake.files import atomic_path
 from loco_drake.gaits import parse_label
 from loco_drake.models.robots import Robot
-from loco_drake.systems.actor import Actor
+from loco_drake.systems.actor import PRIVILEGED, Actor
 from loco_drake.systems.observation import OBSERVATION_SIZE
 
 SET_POINTS = (
@@ -28,7 +28,8 @@ def policy_metadata(actor: Actor, robot: Robot) -> dict[str, str]:
 
     - kind, robot, labels; rate in Hz
     - observation_layout: names and sizes of the parts of the observation, in order;
-      :mod:`loco_drake.systems.observation` says what they are
+      :mod:`loco_drake.systems.observation` says what they are; ignored_parts: those
+      that make no difference to this policy
     - joint_names in the order of the action; standing_joints (rad), which joint
       positions are observed from; kp (Nm/rad) and kd (Nm s/rad) of the joints' PD
     - action_scale (rad) and set_points: what becomes of an action
@@ -47,6 +48,7 @@ def policy_metadata(actor: Actor, robot: Robot) -> dict[str, str]:
         "labels": config.labels,
         "rate": config.rate,
         "observation_layout": config.observation_layout,
+        "ignored_parts": [] if config.privileged else list(PRIVILEGED),
         "joint_names": list(robot.joint_names),
         "standing_joints": robot.stand_joints.tolist(),
         "kp": robot.kp.tolist(),
@@ -77,8 +79,8 @@ def export_onnx(actor: Actor, robot: Robot, path: Path) -> dict[str, str]:
         import onnxscript  # noqa: F401 (torch exports with it)
     except ImportError:
         raise InputError(
-            "To export to ONNX, install the packages onnx and onnxscript: "
-            "pip install 'loco_drake[onnx]'."
+            "To export to ONNX, install the packages onnx and onnxscript, the extra "
+            "'onnx' of loco_drake."
         ) from None
     # It tells of operators of packages that are not installed.
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)

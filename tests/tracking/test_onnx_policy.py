@@ -1,5 +1,6 @@
 import json
 import sys
+from dataclasses import replace
 
 import numpy as np
 import onnxruntime
@@ -10,6 +11,7 @@ from loco_drake.cli.main import main
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.actor import Actor, ActorConfig, load_actor, save_actor
 from loco_drake.systems.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
+from loco_drake.tracking.onnx_policy import policy_metadata
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +83,15 @@ def test_the_file_says_all_that_running_it_takes(exported):
     assert "solo8" not in metadata["licence"]
 
 
+def test_it_says_what_a_policy_ignores(exported):
+    actor, session, _ = exported
+    assert session.get_modelmeta().custom_metadata_map["ignored_parts"] == "[]"
+    config = replace(actor.config, privileged=False)
+    metadata = policy_metadata(Actor(config), get_robot("go2"))
+    ignored = json.loads(metadata["ignored_parts"])
+    assert ignored == ["v_WB_H", "height", "plan_p_H"]
+
+
 def test_without_the_extra_one_sentence_says_what_to_install(
     exported, tmp_path, monkeypatch, capsys
 ):
@@ -88,7 +99,7 @@ def test_without_the_extra_one_sentence_says_what_to_install(
     out = tmp_path / "policy.onnx"
     assert main(["export", "--out", str(out)]) == 2
     assert capsys.readouterr().err == (
-        "loco-drake: To export to ONNX, install the packages onnx and onnxscript: "
-        "pip install 'loco_drake[onnx]'.\n"
+        "loco-drake: To export to ONNX, install the packages onnx and onnxscript, the "
+        "extra 'onnx' of loco_drake.\n"
     )
     assert list(tmp_path.iterdir()) == []
