@@ -24,12 +24,14 @@ def train(references, *options):
 
 def test_options_reach_the_training(references, tmp_path, capsys):
     """One batch in randomized worlds, of a policy without privileged observations."""
-    options = "--steps 1 --workers 1 --randomize --randomization.payload 2 2"
+    options = (
+        "--steps 64 --batch 64 --workers 1 --randomize --randomization.payload 2 2"
+    )
     options += " --no-privileged --json"
     out = tmp_path / "run"
     arguments = [*options.split(), str(tmp_path / "figures.json"), "--out", str(out)]
     assert train(references, *arguments) == 0
-    assert json.loads((tmp_path / "figures.json").read_text())["steps"] == 4096
+    assert json.loads((tmp_path / "figures.json").read_text())["steps"] == 64
     assert not load_actor(
         out / "policy.safetensors", get_robot("go2")
     ).config.privileged
@@ -40,7 +42,7 @@ def test_options_reach_the_training(references, tmp_path, capsys):
     assert randomization["latency"] == list(STANDARD.latency)
     assert environment["termination"]["position"] == 1.0
     capsys.readouterr()
-    resumed = ["--resume", "--steps", "1", "--out", str(out)]
+    resumed = ["--resume", "--steps", "64", "--out", str(out)]
     assert train(references, *resumed) == 2
     assert "'privileged': False" in capsys.readouterr().err
 
