@@ -9,7 +9,7 @@ from loco_drake.systems.plan import Plan
 _MEMORY = 0.98  # weight of the past in a label's score, per episode
 # Even a perfect gait is drawn now and then, so that it is not forgotten; and those that
 # hardly begin to work must not take the time of those that are being learned.
-_LEAST, _MOST = 0.1, 0.5
+_LEAST, _MOST = 0.1, 0.8
 _SHORTEST = 0.05  # share of an episode that the shortest are taken to last
 
 
