@@ -98,9 +98,12 @@ class Environment:
             self._batch.observe()
             for episode in current:
                 episode.steps += 1
-            for i in np.flatnonzero(terminated | truncated):
+            ended = np.flatnonzero(terminated | truncated)
+            for i in ended:
                 current[i] = self._reset(int(i))
                 episodes.append(current[i])
+            if len(ended):
+                self._batch.observe(ended)
         return time.process_time() - start, episodes
 
     def _reset(self, i: int) -> Episode:

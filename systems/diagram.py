@@ -1,12 +1,15 @@
 """The diagram of a robot that does what a plan says."""
 
 from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import (
     Context,
     Diagram,
     DiagramBuilder,
+    InputPort,
     LeafSystem,
+    OutputPort,
 )
 
 from loco_drake.models.plant import AddRobotPlant
@@ -25,9 +28,11 @@ from .pretrained import policy_path
 from .pushes import Pushes
 from .scenario import (
     ExternalAction,
+    ExternalTargets,
     GeneratedReference,
     MotionReference,
     Scenario,
+    TrainedPolicy,
 )
 from .sensors import Sensors
 from .toppra_smoother import ToppraSmoother
@@ -46,21 +51,22 @@ def MakeLocomotionDiagram(
         input_ports:
         - gait (optional, of a generated reference: index into LABELS)
         - action (of ExternalAction)
+        - desired_state (of ExternalTargets, which has only the last two outputs)
         output_ports:
         - plan
         - plan_state
         - path_time
-        - state
         - observation
         - action
         - desired_state
-        - net_actuation
         - reward_terms
+        - state
+        - net_actuation
 
     The subsystems are named plant, scene_graph, reference, smoother, observation,
-    policy, joint_targets, plan_state and reward, and, where the scenario's disturbances
-    ask for them, actuation, pushes and sensors. Simulate it like this, since a robot
-    must start where its plan starts::
+    policy, joint_targets, plan_state and reward, and actuation, pushes and sensors of
+    the scenario's disturbances; what is not asked for is not there.
+    Simulate it like this, since a robot must start where its plan starts::
 
         simulator = Simulator(diagram)
         StartOnPlan(simulator)
@@ -77,7 +83,70 @@ def MakeLocomotionDiagram(
     builder = DiagramBuilder()
     plant, scene_graph, instance = AddRobotPlant(builder, robot, scenario.plant)
     state = plant.get_state_output_port()
+    desired_state = plant.get_desired_state_input_port(instance)
+    measured, desired_state = _AddDisturbances(
+        builder, robot, scenario, plant, desired_state
+    )
+    plan = None
+    if isinstance(scenario.policy, ExternalTargets):
+        builder.ExportInput(desired_state, "desired_state")
+    else:
+        plan = _AddPlan(builder, robot, scenario)
+        _AddControl(builder, robot, scenario.policy, plan, measured, desired_state)
+        _AddScores(builder, robot, plan, state)
+    builder.ExportOutput(state, "state")
+    builder.ExportOutput(plant.get_net_actuation_output_port(instance), "net_actuation")
 
+    if meshcat is not None:
+        MeshcatVisualizer.AddToBuilder(
+            builder, scene_graph, meshcat, MeshcatVisualizerParams()
+        )
+        if plan is not None:
+            drawing = builder.AddNamedSystem(
+                "plan_visualizer", KeypointVisualizer(robot, meshcat)
+            )
+            builder.Connect(plan, drawing.GetInputPort("plan"))
+    diagram = builder.Build()
+    diagram.set_name("locomotion")
+    return diagram
+
+
+def _AddDisturbances(
+    builder: DiagramBuilder,
+    robot: Robot,
+    scenario: Scenario,
+    plant: MultibodyPlant,
+    desired_state: InputPort,
+) -> tuple[OutputPort, InputPort]:
+    """Adds what makes the world unlike the model.
+
+    Returns:
+        The state as it is measured, and the port that takes the PD's set-points.
+    """
+    state = measured = plant.get_state_output_port()
+    if scenario.disturbances.actuation:
+        actuation = builder.AddNamedSystem(
+            "actuation", Actuation(robot, scenario.plant)
+        )
+        builder.Connect(state, actuation.GetInputPort("state"))
+        builder.Connect(actuation.GetOutputPort("desired_state"), desired_state)
+        desired_state = actuation.GetInputPort("desired_state")
+    if scenario.disturbances.pushes:
+        trunk = plant.GetBodyByName(robot.trunk_frame).index()
+        pushes = builder.AddNamedSystem("pushes", Pushes(trunk))
+        builder.Connect(
+            pushes.GetOutputPort("spatial_forces"),
+            plant.get_applied_spatial_force_input_port(),
+        )
+    if scenario.disturbances.sensors:
+        sensors = builder.AddNamedSystem("sensors", Sensors(robot))
+        builder.Connect(state, sensors.GetInputPort("state"))
+        measured = sensors.GetOutputPort("state")
+    return measured, desired_state
+
+
+def _AddPlan(builder: DiagramBuilder, robot: Robot, scenario: Scenario) -> OutputPort:
+    """Adds what makes the plan, exports it and returns its port."""
     reference = _AddReference(builder, robot, scenario)
     plan = reference.GetOutputPort("plan")
     if scenario.smoother is not None:
@@ -94,72 +163,7 @@ def MakeLocomotionDiagram(
     builder.ExportOutput(plan, "plan")
     if reference.HasInputPort("gait"):
         builder.ExportInput(reference.GetInputPort("gait"), "gait")
-
-    targets = builder.AddNamedSystem("joint_targets", JointTargets(robot))
-    builder.Connect(plan, targets.GetInputPort("plan"))
-    desired = targets.GetOutputPort("desired_state")
-    measured = state
-    if scenario.disturbances.actuation:
-        actuation = builder.AddNamedSystem(
-            "actuation", Actuation(robot, scenario.plant)
-        )
-        builder.Connect(desired, actuation.GetInputPort("desired_state"))
-        builder.Connect(state, actuation.GetInputPort("state"))
-        desired = actuation.GetOutputPort("desired_state")
-    if scenario.disturbances.pushes:
-        trunk = plant.GetBodyByName(robot.trunk_frame).index()
-        pushes = builder.AddNamedSystem("pushes", Pushes(trunk))
-        builder.Connect(
-            pushes.GetOutputPort("spatial_forces"),
-            plant.get_applied_spatial_force_input_port(),
-        )
-    if scenario.disturbances.sensors:
-        sensors = builder.AddNamedSystem("sensors", Sensors(robot))
-        builder.Connect(state, sensors.GetInputPort("state"))
-        measured = sensors.GetOutputPort("state")
-    builder.Connect(desired, plant.get_desired_state_input_port(instance))
-    observation = builder.AddNamedSystem("observation", Observation(robot))
-    builder.Connect(plan, observation.GetInputPort("plan"))
-    builder.Connect(measured, observation.GetInputPort("state"))
-    builder.Connect(targets.GetOutputPort("action"), observation.GetInputPort("action"))
-    if isinstance(scenario.policy, ExternalAction):
-        builder.ExportInput(targets.GetInputPort("action"), "action")
-    else:
-        weights = scenario.policy.weights or policy_path(robot)
-        policy = builder.AddNamedSystem(
-            "policy", TrackingPolicy(load_actor(weights, robot))
-        )
-        builder.Connect(
-            observation.GetOutputPort("observation"), policy.GetInputPort("observation")
-        )
-        builder.Connect(policy.GetOutputPort("action"), targets.GetInputPort("action"))
-
-    reward = builder.AddNamedSystem("reward", TrackingReward(robot))
-    builder.Connect(plan, reward.GetInputPort("plan"))
-    builder.Connect(state, reward.GetInputPort("state"))
-    plan_state = builder.AddNamedSystem("plan_state", PlanState(robot))
-    builder.Connect(plan, plan_state.GetInputPort("plan"))
-
-    builder.ExportOutput(plan_state.GetOutputPort("state"), "plan_state")
-    builder.ExportOutput(plan_state.GetOutputPort("path_time"), "path_time")
-    builder.ExportOutput(state, "state")
-    builder.ExportOutput(observation.GetOutputPort("observation"), "observation")
-    builder.ExportOutput(targets.GetOutputPort("action"), "action")
-    builder.ExportOutput(desired, "desired_state")
-    builder.ExportOutput(plant.get_net_actuation_output_port(instance), "net_actuation")
-    builder.ExportOutput(reward.GetOutputPort("reward_terms"), "reward_terms")
-
-    if meshcat is not None:
-        MeshcatVisualizer.AddToBuilder(
-            builder, scene_graph, meshcat, MeshcatVisualizerParams()
-        )
-        drawing = builder.AddNamedSystem(
-            "plan_visualizer", KeypointVisualizer(robot, meshcat)
-        )
-        builder.Connect(plan, drawing.GetInputPort("plan"))
-    diagram = builder.Build()
-    diagram.set_name("locomotion")
-    return diagram
+    return plan
 
 
 def _AddReference(
@@ -175,6 +179,55 @@ def _AddReference(
     if isinstance(reference, MotionReference):
         plan = plan_from_motion(robot, load_motion(reference.path))
     return builder.AddNamedSystem("reference", PlanPlayer(robot, plan))
+
+
+def _AddControl(
+    builder: DiagramBuilder,
+    robot: Robot,
+    config: TrainedPolicy | ExternalAction,
+    plan: OutputPort,
+    state: OutputPort,
+    desired_state: InputPort,
+) -> None:
+    """Adds what turns plan and state into the PD's set-points."""
+    targets = builder.AddNamedSystem("joint_targets", JointTargets(robot))
+    builder.Connect(plan, targets.GetInputPort("plan"))
+    builder.Connect(targets.GetOutputPort("desired_state"), desired_state)
+    observation = builder.AddNamedSystem("observation", Observation(robot))
+    builder.Connect(plan, observation.GetInputPort("plan"))
+    builder.Connect(state, observation.GetInputPort("state"))
+    builder.Connect(targets.GetOutputPort("action"), observation.GetInputPort("action"))
+    if isinstance(config, ExternalAction):
+        builder.ExportInput(targets.GetInputPort("action"), "action")
+    else:
+        weights = config.weights or policy_path(robot)
+        policy = builder.AddNamedSystem(
+            "policy", TrackingPolicy(load_actor(weights, robot))
+        )
+        builder.Connect(
+            observation.GetOutputPort("observation"), policy.GetInputPort("observation")
+        )
+        builder.Connect(policy.GetOutputPort("action"), targets.GetInputPort("action"))
+    builder.ExportOutput(observation.GetOutputPort("observation"), "observation")
+    builder.ExportOutput(targets.GetOutputPort("action"), "action")
+    # What reaches the PD.
+    last = "actuation" if builder.HasSubsystemNamed("actuation") else "joint_targets"
+    sent = builder.GetSubsystemByName(last).GetOutputPort("desired_state")
+    builder.ExportOutput(sent, "desired_state")
+
+
+def _AddScores(
+    builder: DiagramBuilder, robot: Robot, plan: OutputPort, state: OutputPort
+) -> None:
+    """Adds what says how well the plan is followed."""
+    reward = builder.AddNamedSystem("reward", TrackingReward(robot))
+    builder.Connect(plan, reward.GetInputPort("plan"))
+    builder.Connect(state, reward.GetInputPort("state"))
+    builder.ExportOutput(reward.GetOutputPort("reward_terms"), "reward_terms")
+    plan_state = builder.AddNamedSystem("plan_state", PlanState(robot))
+    builder.Connect(plan, plan_state.GetInputPort("plan"))
+    builder.ExportOutput(plan_state.GetOutputPort("state"), "plan_state")
+    builder.ExportOutput(plan_state.GetOutputPort("path_time"), "path_time")
 
 
 def StartOnPlan(simulator: Simulator, diagram: Diagram | None = None) -> None:

@@ -1,8 +1,7 @@
 """From the policy's action to the set-points of the joints' PD controllers."""
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
@@ -10,7 +9,24 @@ from loco_drake.models.robots import Robot
 
 from .plan import PLAN_DT, standing_plan
 
+Array = NDArray[np.float64]
+
 ACTION_SCALE = 0.15  # rad per unit of action: 15 Nm on both robots
+
+
+def joint_targets(set_points: Array, action: Array) -> Array:
+    """Returns what the PD is sent, [q_d, v_d], shape (..., 2 J).
+
+    They are q_d = set_points + ACTION_SCALE * action and v_d = 0: the desired velocity
+    is within the set-points, since Drake's CENIC integrator (1.51) takes it with the
+    wrong sign; the torque kp (q_d - q) - kd v is the same either way.
+
+    Args:
+        set_points: of the plan for the end of the control period, rad, shape (..., J).
+        action: the policy's, shape (..., J).
+    """
+    q_d = set_points + ACTION_SCALE * action
+    return np.concatenate((q_d, np.zeros_like(q_d)), axis=-1)
 
 
 class JointTargets(LeafSystem):
@@ -26,39 +42,26 @@ class JointTargets(LeafSystem):
         - desired_state
         - action
 
-    Every PLAN_DT it samples its inputs and sets
-
-        q_d = set_points + ACTION_SCALE * action
-
-    with the plan's set-points at t + PLAN_DT, which hold its positions, velocities and
-    feed-forward torques: the desired velocity is sent as zero, since Drake's CENIC
-    integrator (1.51) takes it with the wrong sign; the torque kp (q_d - q) - kd v is
-    the same either way. The sampling is an unrestricted update, which Drake
+    Every PLAN_DT it samples its inputs and sets :func:`joint_targets` of the action and
+    of the plan's set-points at t + PLAN_DT, which hold the plan's positions, velocities
+    and feed-forward torques. The sampling is an unrestricted update, which Drake
     performs before the plant's discrete update at the same time: the action reaches
     the joints without delay. The output ``action`` is the one being held.
     """
 
     def __init__(self, robot: Robot) -> None:
         super().__init__()
-        self._size = len(robot.joint_names)
+        size = len(robot.joint_names)
         self._plan = self.DeclareAbstractInputPort("plan", Value(standing_plan(robot)))
-        self._action = self.DeclareVectorInputPort("action", self._size)
-        # The action, the desired positions, and the desired velocities, which are zero.
-        self._held = self.DeclareDiscreteState(
-            np.concatenate(
-                (np.zeros(self._size), robot.stand_joints, np.zeros(self._size))
-            )
+        self._action = self.DeclareVectorInputPort("action", size)
+        still = np.zeros(size)
+        self._targets = self.DeclareDiscreteState(
+            joint_targets(robot.stand_joints, still)
         )
-        state = {self.discrete_state_ticket(self._held)}
-        self.DeclareVectorOutputPort(
-            "desired_state",
-            2 * self._size,
-            self._calc_desired_state,
-            prerequisites_of_calc=state,
-        )
-        self.DeclareVectorOutputPort(
-            "action", self._size, self._calc_action, prerequisites_of_calc=state
-        )
+        self._held = self.DeclareDiscreteState(still)
+        # Ports of states need no Python while the plant steps.
+        self.DeclareStateOutputPort("desired_state", self._targets)
+        self.DeclareStateOutputPort("action", self._held)
         self.DeclarePeriodicUnrestrictedUpdateEvent(
             period_sec=PLAN_DT, offset_sec=0.0, update=self._sample
         )
@@ -66,16 +69,8 @@ class JointTargets(LeafSystem):
     def _sample(self, context: Context, state: State) -> EventStatus:
         plan = self._plan.Eval(context)
         action = self._action.Eval(context)
-        k = plan.index(context.get_time() + PLAN_DT)
-        held = state.get_mutable_discrete_state(int(self._held)).get_mutable_value()
-        held[: self._size] = action
-        held[self._size : 2 * self._size] = plan.set_points[k] + ACTION_SCALE * action
+        set_points = plan.set_points[plan.index(context.get_time() + PLAN_DT)]
+        targets = state.get_mutable_discrete_state(int(self._targets))
+        targets.set_value(joint_targets(set_points, action))
+        state.get_mutable_discrete_state(int(self._held)).set_value(action)
         return EventStatus.Succeeded()
-
-    def _calc_desired_state(self, context: Context, output: Any) -> None:
-        held = context.get_discrete_state(int(self._held)).value()
-        output.set_value(held[self._size :])
-
-    def _calc_action(self, context: Context, output: Any) -> None:
-        held = context.get_discrete_state(int(self._held)).value()
-        output.set_value(held[: self._size])

@@ -72,7 +72,13 @@ def preview(plan: Plan, time: float) -> Preview:
     return Preview(plan.q[k], plan.v[k], plan.contacts[k], plan.labels[now])
 
 
-def observe(robot: Robot, ahead: Preview, state: Array, action: Array) -> Array:
+def observe(
+    robot: Robot,
+    ahead: Preview,
+    state: Array,
+    action: Array,
+    R_WB: Array | None = None,
+) -> Array:
     """Returns observations, shape (..., OBSERVATION_SIZE).
 
     Args:
@@ -80,9 +86,11 @@ def observe(robot: Robot, ahead: Preview, state: Array, action: Array) -> Array:
         ahead: what it is to do.
         state: the plant's [q, v], as in :class:`Plan`, shape (..., 37).
         action: the action being applied, shape (..., 12).
+        R_WB: the base's rotation matrix (..., 3, 3), if it is known already.
     """
     q, v = state[..., :19], state[..., 19:]
-    R_WB = quat_to_matrix(q[..., :4])
+    if R_WB is None:
+        R_WB = quat_to_matrix(q[..., :4])
     R_WH = heading_matrix(R_WB)
     parts = (
         -R_WB[..., 2, :],

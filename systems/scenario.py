@@ -55,6 +55,11 @@ class ExternalAction:
     """The diagram's input port "action" takes the place of the policy."""
 
 
+@dataclass(kw_only=True)
+class ExternalTargets:
+    """The diagram's input port "desired_state" is the PD's: there is only the plant."""
+
+
 # Hashable: batches keep one diagram of each kind.
 @dataclass(kw_only=True, unsafe_hash=True)
 class Disturbances:
@@ -86,7 +91,9 @@ class Scenario:
     # How the motion is re-timed; without it the plan is tracked as it was written.
     smoother: SmootherConfig | None = field(default_factory=SmootherConfig)
     # What drives the joints.
-    policy: TrainedPolicy | ExternalAction = field(default_factory=TrainedPolicy)
+    policy: TrainedPolicy | ExternalAction | ExternalTargets = field(
+        default_factory=TrainedPolicy
+    )
     # What there is between policy and robot beyond the model.
     disturbances: Disturbances = field(default_factory=Disturbances)
 

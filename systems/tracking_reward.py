@@ -22,7 +22,11 @@ REWARD_WEIGHTS = np.array([0.5, 0.05, 0.2, 0.15, 0.1])
 
 
 def reward_terms(
-    robot: Robot, plan_state: Array, plan_p_BoF_H: Array, state: Array
+    robot: Robot,
+    plan_state: Array,
+    plan_p_BoF_H: Array,
+    state: Array,
+    R_WB: Array | None = None,
 ) -> Array:
     """Returns the five terms of the reward, weighted, (..., 5); their sum is at most 1.
 
@@ -40,9 +44,11 @@ def reward_terms(
         plan_state: what the plan wants, [q, v] as in :class:`Plan`, shape (..., 37).
         plan_p_BoF_H: the plan's toes, as :attr:`Plan.p_BoF_H`, shape (..., 4, 3).
         state: the plant's [q, v], shape (..., 37).
+        R_WB: the base's rotation matrix (..., 3, 3), if it is known already.
     """
     q, v = state[..., :19], state[..., 19:]
-    R_WB = quat_to_matrix(q[..., :4])
+    if R_WB is None:
+        R_WB = quat_to_matrix(q[..., :4])
     p_BoF_H = toe_positions(robot, q[..., 7:]) @ (
         np.swapaxes(R_WB, -1, -2) @ heading_matrix(R_WB)
     )

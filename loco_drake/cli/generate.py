@@ -9,6 +9,7 @@ from loco_drake.errors import InputError, check_at_least, check_choice
 from loco_drake.gait_schedule import parse_schedule
 from loco_drake.generation.generate import (
     check_duration,
+    check_pace,
     check_sampling,
     generate_motions,
 )
@@ -37,6 +38,9 @@ class Generate:
     """The robot: go2 or a1."""
     out: Path = Path("motions/generated")
     """Folder for the Motion files."""
+    pace: float | None = None
+    """How fast, from 0, the slowest that the gait was recorded at, to 1, the fastest.
+    Default: each seed has a pace of its own."""
     temperature: float = 1.0
     """Above 1 more varied, below 1 more typical, 0 always the likeliest."""
     top_p: float = 0.95
@@ -58,6 +62,7 @@ class Generate:
         check_duration(self.duration)
         schedule.check_ends_by(self.duration)
         check_sampling(self.temperature, self.top_p)
+        check_pace(self.pace)
         check_choice("robot", self.robot, ROBOTS)
         check_at_least("count", self.count, 1)
         if self.seed < 0:
@@ -78,6 +83,7 @@ class Generate:
                 seeds,
                 temperature=self.temperature,
                 top_p=self.top_p,
+                pace=self.pace,
             )
             seconds += time.perf_counter() - start
             for seed, motion in zip(seeds, motions, strict=True):

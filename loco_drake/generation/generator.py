@@ -1,4 +1,4 @@
-"""A GPT that writes tokens of motion for a source, a gait and a duration.
+"""A GPT that writes tokens of motion for a source, a gait, a pace and a duration.
 
 One transformer step per token. The codes of a token's books are drawn one after the
 other by small heads that see the transformer's output and the codes drawn so far,
@@ -15,7 +15,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from loco_drake.gaits import ONE_HOT, ONE_HOT_SIZE
+from loco_drake.gaits import LABELS, ONE_HOT, ONE_HOT_SIZE
+from loco_drake.generation import pace
 from loco_drake.generation.layers import RotaryAttention
 from loco_drake.weights import load_network, save_weights
 
@@ -87,7 +88,7 @@ class Block(nn.Module):
 
 
 class Generator(nn.Module):
-    """The GPT over tokens, conditioned at every step on label and duration.
+    """The GPT over tokens, conditioned at every step on label, pace and duration.
 
     Step t is given the codes of token t - 1 and the condition of token t, and
     predicts the codes of token t. A code of ``book_size`` stands for "nothing
@@ -108,6 +109,10 @@ class Generator(nn.Module):
         # Tables of all books lie in one; book j begins at row j * (size + 1).
         self.codes_in = nn.Embedding(books * (size + 1), width)
         self.gait_in = nn.Linear(ONE_HOT_SIZE, width, bias=False)
+        self.pace_in = nn.Embedding(pace.BINS, width)
+        # Stand heights per second, see pace.speed_edges.
+        self.register_buffer("speed_edges", torch.zeros(len(LABELS), pace.BINS - 1))
+        self.speed_edges: Tensor
         self.duration_in = nn.Embedding(DURATION_BINS, width)
         self.dropout = nn.Dropout(config.dropout)
         self.blocks = nn.ModuleList(Block(config) for _ in range(config.layers))
@@ -124,6 +129,7 @@ class Generator(nn.Module):
         self,
         before: Tensor,
         labels: Tensor,
+        paces: Tensor,
         duration: Tensor,
         cache: Cache | None = None,
     ) -> tuple[Tensor, Cache]:
@@ -132,12 +138,14 @@ class Generator(nn.Module):
         Args:
             before: codes of the token before each step, shape (B, T, books).
             labels: index into gaits.LABELS of each step's token, shape (B, T).
+            paces: bin of its pace, shape (B, T) or (B, 1).
             duration: bin of the sequence's duration, shape (B,).
             cache: that of the steps before, then T must be 1.
         """
         offset = torch.arange(self.config.books) * (self.config.book_size + 1)
         x = self.codes_in(before + offset).sum(dim=-2)  # (B, T, width)
-        x = x + self.gait_in(self.one_hot[labels]) + self.duration_in(duration)[:, None]
+        x = x + self.gait_in(self.one_hot[labels]) + self.pace_in(paces)
+        x = x + self.duration_in(duration)[:, None]
         x = self.dropout(x)
         present: Cache = []
         for i, block in enumerate(self.blocks):
@@ -162,14 +170,19 @@ class Generator(nn.Module):
         return told
 
     def forward(
-        self, before: Tensor, labels: Tensor, duration: Tensor, codes: Tensor
+        self,
+        before: Tensor,
+        labels: Tensor,
+        paces: Tensor,
+        duration: Tensor,
+        codes: Tensor,
     ) -> Tensor:
         """Returns logits (B, T, books, book_size) of the tokens ``codes``.
 
         Logits of a book depend on ``before`` up to their step and, within the step,
         on ``codes`` of earlier books. For the arguments see :meth:`trunk`.
         """
-        hidden, _ = self.trunk(before, labels, duration)
+        hidden, _ = self.trunk(before, labels, paces, duration)
         earlier = torch.zeros_like(hidden)
         logits = []
         for book in range(self.config.books):
@@ -182,6 +195,7 @@ class Generator(nn.Module):
         self,
         history: Tensor,
         labels: Tensor,
+        paces: Tensor,
         duration: Tensor,
         uniforms: Tensor,
         temperature: float,
@@ -194,6 +208,7 @@ class Generator(nn.Module):
             labels: of the tokens from one after the first in ``history`` to the last
                 new one (without history: of the new ones), shape (B, H - 1 + n), or
                 (B, n).
+            paces: bin of the sequence's pace, shape (B, 1).
             duration: bin of the sequence's duration, shape (B,).
             uniforms: the dice, in [0, 1), shape (B, n, books).
             temperature: divides the logits; 0 takes the likeliest code.
@@ -203,7 +218,7 @@ class Generator(nn.Module):
         if history.shape[1] == 0:
             history = torch.full((batch, 1, books), self.config.book_size)
         given = history.shape[1]
-        hidden, cache = self.trunk(history, labels[:, :given], duration)
+        hidden, cache = self.trunk(history, labels[:, :given], paces, duration)
         hidden = hidden[:, -1]
         tokens = []
         for step in range(steps):
@@ -219,7 +234,7 @@ class Generator(nn.Module):
             tokens.append(token)
             if step < steps - 1:
                 label = labels[:, given + step, None]
-                hidden, cache = self.trunk(token, label, duration, cache)
+                hidden, cache = self.trunk(token, label, paces, duration, cache)
                 hidden = hidden[:, -1]
         return torch.cat(tokens, dim=1)
 

@@ -14,6 +14,7 @@ from loco_drake.gaits import LABELS
 from loco_drake.generation.determinism import single_thread, uniforms
 from loco_drake.generation.footing import Footing, start_footing, step_footing
 from loco_drake.generation.generator import Generator, duration_bin, load_generator
+from loco_drake.generation.pace import drawn_rank, rank_bin
 from loco_drake.generation.tokenizer import Tokenizer, load_tokenizer
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.motion import FPS
@@ -35,6 +36,7 @@ class Stream:
     Attributes:
         seeds: of each motion, shape (B,).
         duration: how long each is to last, in s, shape (B,).
+        pace: of each, in [0, 1], see :mod:`loco_drake.generation.pace`, shape (B,).
         chunk: how many times the stream was extended.
         tokens: the latest ones, shape (B, n, books).
         labels: of ``tokens``, index into gaits.LABELS, shape (B, n).
@@ -46,6 +48,7 @@ class Stream:
 
     seeds: Integers
     duration: Array
+    pace: Array
     chunk: int
     tokens: Integers
     labels: Integers
@@ -139,6 +142,7 @@ class MotionModel:
         seeds: Integers,
         duration: Array | float = 3600.0,
         pose: Array | None = None,
+        pace: Array | float | None = None,
     ) -> Stream:
         """Returns a stream of B motions of which nothing is generated yet.
 
@@ -147,6 +151,8 @@ class MotionModel:
                 becomes depends on its own seed only.
             duration: how long the motions are to last, in s, shape (B,) or for all.
             pose: x, y, yaw of the first frame in m and rad, shape (B, 3); default 0.
+            pace: rank in [0, 1] of the speed among those at which the gait was
+                recorded, shape (B,) or for all; by default each seed has its own.
         """
         seeds = np.array(seeds, dtype=np.int64)
         batch = len(seeds)
@@ -154,6 +160,11 @@ class MotionModel:
         return Stream(
             seeds=seeds,
             duration=np.broadcast_to(np.asarray(duration, np.float64), (batch,)).copy(),
+            pace=(
+                drawn_rank(seeds)
+                if pace is None
+                else np.broadcast_to(np.asarray(pace, np.float64), (batch,)).copy()
+            ),
             chunk=0,
             tokens=np.zeros((batch, 0, books), dtype=np.int64),
             labels=np.zeros((batch, 0), dtype=np.int64),
@@ -208,6 +219,7 @@ class MotionModel:
             drawn = self._writer.sample(
                 torch.from_numpy(history.copy()),
                 torch.from_numpy(np.concatenate((given[:, 1:], new), axis=1)),
+                torch.from_numpy(rank_bin(stream.pace)[:, None]),
                 torch.from_numpy(duration_bin(stream.duration)),
                 torch.from_numpy(np.stack(dice)),
                 temperature,

@@ -12,6 +12,7 @@ from torch.nn import functional
 
 from loco_drake.errors import InputError
 from loco_drake.gaits import GaitLabel
+from loco_drake.generation import pace
 from loco_drake.generation.determinism import single_thread
 from loco_drake.generation.generator import (
     LONGEST,
@@ -45,10 +46,12 @@ class Codes:
     Attributes:
         label: index into gaits.LABELS.
         codes: shape (n, books).
+        speeds: around each token, see :func:`pace.token_speeds`, shape (n,).
     """
 
     label: int
     codes: NDArray[np.int64]
+    speeds: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.codes)
@@ -63,7 +66,8 @@ def encode_clips(
         robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
         with torch.inference_mode(), single_thread():
             codes = tokenizer.encode(clip_tensor(tokenizer, clip), robot)
-        encoded.append(Codes(clip.label.index, codes[0, :, :books].numpy()))
+        speeds = pace.token_speeds(clip.features, tokenizer.config.frames_per_token)
+        encoded.append(Codes(clip.label.index, codes[0, :, :books].numpy(), speeds))
     return encoded
 
 
@@ -121,10 +125,14 @@ def train_generator(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
         generator = Generator(config)
+    edges = pace.speed_edges((each.label, each.speeds) for each in encoded)
+    generator.speed_edges.copy_(torch.from_numpy(edges))
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         chosen = [encoded[i] for i in random.integers(len(encoded), size=BATCH)]
-        loss = generator_loss(generator, *make_batch(config, chosen, random))
+        loss = generator_loss(
+            generator, *make_batch(config, generator.speed_edges, chosen, random)
+        )
         return loss, {}
 
     run = {
@@ -141,23 +149,30 @@ def train_generator(
 
 
 def make_batch(
-    config: GeneratorConfig, chosen: Sequence[Codes], random: np.random.Generator
-) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    config: GeneratorConfig,
+    edges: Tensor,
+    chosen: Sequence[Codes],
+    random: np.random.Generator,
+) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
     """Cuts a window out of each sequence, at random.
 
     The duration that a window is told is drawn too: any stretch of a gait is also
     one of a longer performance.
 
     Returns:
-        before, labels, duration and codes as :meth:`Generator.forward` takes them.
+        before, labels, paces, duration and codes as :meth:`Generator.forward` takes
+        them.
     """
     length = config.window + GROWTH
     batch = len(chosen)
     windows = np.empty((batch, length + 1, config.books), dtype=np.int64)
+    paces = np.empty((batch, length), dtype=np.int64)
     for i, sequence in enumerate(chosen):
         # The token before the window is all that the first step is told.
         start = random.integers(len(sequence) - length)
         windows[i] = sequence.codes[start : start + length + 1]
+        speeds = sequence.speeds[start + 1 : start + length + 1]
+        paces[i] = np.searchsorted(edges[sequence.label].numpy(), speeds)
     windows[random.random(batch) < NO_HISTORY, 0] = config.book_size
     before, codes = windows[:, :-1].copy(), windows[:, 1:].copy()
     labels = np.repeat([[sequence.label] for sequence in chosen], length, axis=1)
@@ -169,6 +184,7 @@ def make_batch(
     return (
         torch.from_numpy(before),
         torch.from_numpy(labels),
+        torch.from_numpy(paces),
         torch.from_numpy(duration_bin(seconds)),
         torch.from_numpy(codes),
     )
@@ -178,11 +194,12 @@ def generator_loss(
     generator: Generator,
     before: Tensor,
     labels: Tensor,
+    paces: Tensor,
     duration: Tensor,
     codes: Tensor,
 ) -> Tensor:
     """Returns the mean cross-entropy in nats a code; see :meth:`Generator.forward`."""
-    logits = generator(before, labels, duration, codes)
+    logits = generator(before, labels, paces, duration, codes)
     return functional.cross_entropy(logits.flatten(0, 2), codes.flatten())
 
 
@@ -196,9 +213,11 @@ def score_generator(
         codes = torch.from_numpy(sequence.codes)[None]
         first = torch.full((1, 1, config.books), config.book_size)
         labels = torch.full(codes.shape[:2], sequence.label)
+        edges = generator.speed_edges[sequence.label].numpy()
+        paces = torch.from_numpy(np.searchsorted(edges, sequence.speeds))[None]
         duration = torch.from_numpy(duration_bin(np.array([LONGEST])))
         before = torch.cat((first, codes[:, :-1]), dim=1)
         with torch.inference_mode(), single_thread():
-            loss = generator_loss(generator, before, labels, duration, codes)
+            loss = generator_loss(generator, before, labels, paces, duration, codes)
         total, count = total + float(loss) * codes.numel(), count + codes.numel()
     return total / max(count, 1)

@@ -37,8 +37,7 @@ class ResetNoise:
         state = state.copy()
         turn = yaw_quat(self.heading * random.standard_normal(1))[0]
         state[:4] = quat_multiply(turn, state[:4])
-        state[19:22] = quat_rotate(turn, state[19:22])
-        state[22:25] = quat_rotate(turn, state[22:25])
+        state[19:25] = quat_rotate(turn, state[19:25].reshape(2, 3)).ravel()
         state[4:6] += self.position * random.standard_normal(2)
         state[7:19] += self.joints * random.standard_normal(12)
         state[19:] += self.velocities * random.standard_normal(18)

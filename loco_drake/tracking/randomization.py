@@ -114,13 +114,19 @@ class RandomizationConfig:
         )
 
     @property
+    def changes_physics(self) -> bool:
+        """Whether worlds differ from the model in more than what is measured."""
+        others = {"noise", "push_interval"}
+        return any(
+            getattr(self, part.name) is not None
+            for part in fields(self)
+            if part.name not in others
+        )
+
+    @property
     def is_off(self) -> bool:
         """Whether every world is like the model."""
-        return all(
-            getattr(self, part.name) is None
-            for part in fields(self)
-            if part.name != "push_interval"
-        )
+        return not self.changes_physics and self.noise is None
 
     def draw(
         self, robot: Robot, random: np.random.Generator, start: float, end: float

@@ -1,6 +1,7 @@
 """Environments in worker processes, many to a worker, as one vectorized environment."""
 
 import contextlib
+import gc
 import multiprocessing
 import signal
 from collections.abc import Sequence
@@ -30,6 +31,8 @@ def _work(
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     batch = TrackingBatch(plans, config, len(seeds))
     random = [np.random.default_rng(seed) for seed in seeds]
+    # What there is now stays: the garbage collector need not look through it each time.
+    gc.freeze()
     try:
         while (message := pipe.recv()) is not None:
             actions, next_plans = message
@@ -54,15 +57,16 @@ def _step(
     observations = batch.observe()
     done = terminated | truncated
     infos: list[dict[str, Any]] = [{} for _ in next_plans]
-    for i in np.flatnonzero(done):
+    ended = np.flatnonzero(done)
+    for i in ended:
         infos[i] = {
             "plan": int(batch.plan[i]),
             "TimeLimit.truncated": bool(truncated[i]),
             "terminal_observation": observations[i].copy(),
         }
         batch.reset(int(i), random[i], next_plans[i])
-    if done.any():
-        observations = batch.observe()
+    if len(ended):
+        observations[ended] = batch.observe(ended)
     return observations, terms.sum(axis=-1), done, infos
 
 

@@ -13,6 +13,7 @@ from loco_drake.generation.generator import (
     save_generator,
 )
 from loco_drake.generation.layers import turn_channels
+from loco_drake.generation.pace import BINS
 
 TINY = GeneratorConfig(
     tokenizer="0" * 16,
@@ -41,40 +42,41 @@ def inputs(steps=10, batch=2):
     torch.manual_seed(1)
     before = torch.randint(8, (batch, steps, 3))
     labels = torch.randint(2, (batch, steps))
+    paces = torch.randint(BINS, (batch, 1))
     duration = torch.randint(DURATION_BINS, (batch,))
     codes = torch.randint(8, (batch, steps, 3))
-    return before, labels, duration, codes
+    return before, labels, paces, duration, codes
 
 
 def test_changing_a_later_token_leaves_earlier_logits_alone(generator):
-    before, labels, duration, codes = inputs()
+    before, labels, paces, duration, codes = inputs()
     other = before.clone()
     other[:, 6] = (other[:, 6] + 1) % 8
     with torch.no_grad():
-        a = generator(before, labels, duration, codes)
-        b = generator(other, labels, duration, codes)
+        a = generator(before, labels, paces, duration, codes)
+        b = generator(other, labels, paces, duration, codes)
     torch.testing.assert_close(a[:, :6], b[:, :6], atol=1e-6, rtol=0)
     assert (a[:, 6:] - b[:, 6:]).abs().amax(dim=(0, 2, 3)).min() > 1e-3
 
 
 def test_changing_a_later_label_leaves_earlier_logits_alone(generator):
-    before, labels, duration, codes = inputs()
+    before, labels, paces, duration, codes = inputs()
     other = labels.clone()
     other[:, 6] = 1 - other[:, 6]
     with torch.no_grad():
-        a = generator(before, labels, duration, codes)
-        b = generator(before, other, duration, codes)
+        a = generator(before, labels, paces, duration, codes)
+        b = generator(before, other, paces, duration, codes)
     torch.testing.assert_close(a[:, :6], b[:, :6], atol=1e-6, rtol=0)
     assert (a[:, 6:] - b[:, 6:]).abs().amax(dim=(0, 2, 3)).min() > 1e-3
 
 
 def test_a_book_sees_the_earlier_books_of_its_token_only(generator):
-    before, labels, duration, codes = inputs()
+    before, labels, paces, duration, codes = inputs()
     other = codes.clone()
     other[:, 4, 1] = (other[:, 4, 1] + 1) % 8
     with torch.no_grad():
-        a = generator(before, labels, duration, codes)
-        b = generator(before, labels, duration, other)
+        a = generator(before, labels, paces, duration, codes)
+        b = generator(before, labels, paces, duration, other)
     changed = (a - b).abs().amax(dim=(0, 3)) > 1e-6  # (steps, books)
     expected = torch.zeros(10, 3, dtype=torch.bool)
     expected[4, 2] = True
@@ -82,26 +84,30 @@ def test_a_book_sees_the_earlier_books_of_its_token_only(generator):
 
 
 def test_the_condition_counts(generator):
-    before, labels, duration, codes = inputs()
+    before, labels, paces, duration, codes = inputs()
     with torch.no_grad():
-        a = generator(before, labels, duration, codes)
-        b = generator(before, labels, (duration + 5) % DURATION_BINS, codes)
+        a = generator(before, labels, paces, duration, codes)
+        b = generator(before, labels, paces, (duration + 5) % DURATION_BINS, codes)
+        c = generator(before, labels, (paces + 5) % BINS, duration, codes)
     assert (a - b).abs().amin(dim=(1, 2)).max() > 1e-3
+    assert (a - c).abs().amin(dim=(1, 2)).max() > 1e-3
 
 
 def test_sampling_with_a_cache_is_the_plain_network(generator):
     """Temperature 0 against the likeliest code of the whole forward pass."""
-    history, labels, duration, _ = inputs(steps=5)
+    history, labels, paces, duration, _ = inputs(steps=5)
     labels = torch.randint(2, (2, 5 - 1 + 4))
     dice = torch.rand(2, 4, 3, dtype=torch.float64)
-    drawn = generator.sample(history, labels, duration, dice, 0.0, 1.0)
+    drawn = generator.sample(history, labels, paces, duration, dice, 0.0, 1.0)
     sequence = history
     for step in range(4):
         token = torch.zeros(2, 1, 3, dtype=torch.long)
         for book in range(3):
             guess = torch.cat((sequence[:, 1:], token), dim=1)
             with torch.no_grad():
-                logits = generator(sequence, labels[:, : 5 + step], duration, guess)
+                logits = generator(
+                    sequence, labels[:, : 5 + step], paces, duration, guess
+                )
             token[:, 0, book] = logits[:, -1, book].argmax(dim=-1)
         assert torch.equal(drawn[:, step], token[:, 0])
         sequence = torch.cat((sequence, token), dim=1)
@@ -157,10 +163,10 @@ def test_saved_weights_come_back(generator, tmp_path):
     save_generator(generator, path, {})
     loaded = load_generator(path)
     assert loaded.config == TINY
-    before, labels, duration, codes = inputs()
+    before, labels, paces, duration, codes = inputs()
     with torch.no_grad():
-        a = generator(before, labels, duration, codes)
-        b = loaded(before, labels, duration, codes)
+        a = generator(before, labels, paces, duration, codes)
+        b = loaded(before, labels, paces, duration, codes)
     torch.testing.assert_close(a, b, atol=0.05, rtol=0.01)  # 16 bits
 
 

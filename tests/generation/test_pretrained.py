@@ -85,6 +85,22 @@ def test_pairs_of_legs_of_the_gaits():
         assert with_fl[partner] > 0.4
 
 
+@pytest.mark.parametrize("label", ["dog-pace", "horse-walk", "solo8-trot"])
+def test_a_faster_pace_is_faster_and_is_kept(label):
+    """Speeds rise with the rank, and a motion stays within those of its label."""
+    model = pretrained_motion_model("go2")
+    speeds = []
+    for pace in (0.05, 0.5, 0.95):
+        motions = generate_motions(model, parse_label(label), 8.0, range(4), pace=pace)
+        speeds.append(np.mean([forward_speed(model.robot, m) for m in motions]))
+    edges = model.generator.speed_edges[parse_label(label).index].numpy()
+    edges = edges.astype(float) * model.robot.stand_height
+    assert speeds[0] < speeds[1] < speeds[2]
+    assert speeds[0] < edges[6]
+    assert edges[4] < speeds[1] < edges[10]
+    assert edges[8] < speeds[2]
+
+
 # Greatest acceleration about a change, over that of the gaits themselves: to brake from
 # 1.5 m/s to .4 takes more than an even trot and a walk do.
 CHANGES = {

@@ -16,6 +16,7 @@ from loco_drake.generation.generator import (
 )
 from loco_drake.generation.library import Clip, load_library
 from loco_drake.generation.motion_model import MotionModel
+from loco_drake.generation.pace import BINS, speed_edges
 from loco_drake.generation.tokenizer import TokenizerConfig, load_tokenizer
 from loco_drake.generation.tokenizer_score import score_tokenizer
 from loco_drake.generation.train_generator import (
@@ -171,13 +172,16 @@ def test_windows_are_shifted_by_one_token(library, tokenizer):
     config = generator_config(tokenizer)
     encoded = encode_clips(tokenizer, stitched_clips(library.train, 16, 0), books=2)
     random = np.random.default_rng(0)
-    before, labels, duration, codes = make_batch(config, encoded, random)
+    edges = torch.from_numpy(speed_edges((e.label, e.speeds) for e in encoded))
+    before, labels, paces, duration, codes = make_batch(config, edges, encoded, random)
     agree = (before[:, 1:] == codes[:, :-1]).float().mean()
     assert 1 - CORRUPTION * 1.5 < agree < 1.0
     starts = (before[:, 0] == config.book_size).all(dim=-1)
     assert 0 < starts.sum() < len(encoded)
     for row, sequence in zip(labels, encoded, strict=True):
         assert set(row.tolist()) == {sequence.label}
+    assert paces.shape == labels.shape
+    assert 0 <= paces.min() < paces.max() < BINS
     # No window is told a duration that is shorter than itself.
     assert duration.min() >= duration_bin(20 * 4 / 50)
 

@@ -4,11 +4,13 @@ import torch
 from pydrake.systems.analysis import Simulator
 
 from loco_drake.errors import InputError
+from loco_drake.models.robots import get_robot
 from loco_drake.motion import save_motion
 from loco_drake.systems.actor import Actor, ActorConfig, save_actor
 from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
 from loco_drake.systems.scenario import (
     ExternalAction,
+    ExternalTargets,
     GeneratedReference,
     LoadScenario,
     MotionReference,
@@ -126,6 +128,25 @@ def test_an_open_action_port_drives_the_joints():
     # .1 rad more on each calf, less what the weight takes of it.
     assert (after - before > 0.05).all()
     assert (after - before < 0.2).all()
+
+
+def test_open_targets_leave_the_plant_alone():
+    """It stands on its stance, and bends its knees by what they are sent."""
+    diagram = MakeLocomotionDiagram(Scenario(policy=ExternalTargets()))
+    names = {system.get_name() for system in diagram.GetSystems()}
+    assert names == {"plant", "scene_graph"}
+    robot = get_robot("go2")
+    simulator = Simulator(diagram)
+    context = simulator.get_mutable_context()
+    knees = []
+    for bend in (0.0, 0.1):
+        q_d = robot.stand_joints + bend * np.tile([0.0, 0.0, 1.0], 4)
+        targets = np.concatenate((q_d, np.zeros(12)))
+        diagram.GetInputPort("desired_state").FixValue(context, targets)
+        simulator.AdvanceTo(context.get_time() + 1.0)
+        knees.append(diagram.GetOutputPort("state").Eval(context)[9:19:3])
+    np.testing.assert_allclose(knees[0], robot.stand_joints[2::3], atol=0.1)
+    np.testing.assert_allclose(knees[1] - knees[0], 0.1, atol=0.03)
 
 
 def test_a_robot_without_weights_says_which_have_some(tmp_path):

@@ -1,0 +1,147 @@
+"""Control periods of the simulated plant, in one world for all robots or in many."""
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Diagram
+
+from loco_drake.models.plant import ConfigureSimulator, PlantConfig
+from loco_drake.systems.diagram import MakeLocomotionDiagram
+from loco_drake.systems.domain import Domain, SetDomain
+from loco_drake.systems.plan import PLAN_DT
+from loco_drake.systems.scenario import Disturbances, ExternalTargets, Scenario
+from loco_drake.tracking.config import EnvironmentConfig
+
+Array = NDArray[np.float64]
+
+
+@lru_cache(maxsize=4)
+def _diagram(
+    robot: str,
+    contact: str,
+    time_step: float,
+    friction: float,
+    disturbances: Disturbances,
+) -> Diagram:
+    # One per process: pydrake never frees diagrams with Python systems.
+    plant = PlantConfig(contact=contact, time_step=time_step, friction=friction)
+    return MakeLocomotionDiagram(
+        Scenario(
+            robot=robot,
+            plant=plant,
+            policy=ExternalTargets(),
+            disturbances=disturbances,
+        )
+    )
+
+
+class _Simulation:
+    """The plant in a Context, with its state and the port of its targets at hand."""
+
+    def __init__(self, config: EnvironmentConfig, disturbances: Disturbances) -> None:
+        plant = config.plant
+        diagram = _diagram(
+            config.robot, plant.contact, plant.time_step, plant.friction, disturbances
+        )
+        self._diagram = diagram
+        self._simulator = Simulator(diagram, diagram.CreateDefaultContext())
+        ConfigureSimulator(self._simulator, plant)
+        self._context = self._simulator.get_mutable_context()
+        self._plant = diagram.GetSubsystemByName("plant")
+        self._plant_context = self._plant.GetMyMutableContextFromRoot(self._context)
+        port = diagram.GetInputPort("desired_state")
+        self._desired_state = port.FixValue(self._context, np.zeros(port.size()))
+
+    def _set(self, state: Array, desired_state: Array) -> None:
+        self._plant.SetPositionsAndVelocities(self._plant_context, state)
+        # GetMutableData tells what depends on it that it changes.
+        self._desired_state.GetMutableData().get_mutable_value().set_value(
+            desired_state
+        )
+
+    def _advance(self, time: float) -> Array:
+        self._simulator.AdvanceTo(time, interruptible=False)
+        return np.asarray(self._plant.GetPositionsAndVelocities(self._plant_context))
+
+
+class SharedWorld(_Simulation):
+    """One control period of a robot, as a function of its state and its targets.
+
+    [q, v] is all the state of the diagram, and the plant does not know the time, so
+    that one Context serves all robots: with one for each, every step would find the
+    caches of the processor filled with those of the others.
+    """
+
+    def __init__(self, config: EnvironmentConfig) -> None:
+        super().__init__(config, Disturbances())
+        # The clock may run on where the steps of the plant meet the control periods to
+        # the last bit, however late it is. An integrator must forget the last robot.
+        steps = PLAN_DT / config.plant.time_step
+        power_of_2 = steps >= 1 and math.frexp(steps)[0] == 0.5
+        self._runs_on = power_of_2 and config.plant.contact != "cenic"
+        self._periods = 0
+        self._simulator.Initialize()
+
+    def begin(self, domain: Domain, sample: int) -> None:
+        """Does nothing: every episode's world is the model's."""
+
+    def advance(self, state: Array, desired_state: Array) -> Array:
+        """Returns the state [q, v], (37,), one control period after ``state``.
+
+        Args:
+            state: as what is returned.
+            desired_state: of the PD, [q_d, v_d], shape (24,).
+        """
+        self._set(state, desired_state)
+        if not self._runs_on:
+            self._periods = 0
+            self._context.SetTime(0.0)
+            self._simulator.Initialize()
+        self._periods += 1
+        return self._advance(self._periods * PLAN_DT)
+
+
+class OwnWorld(_Simulation):
+    """One robot in a world of its own, drawn anew for each of its episodes.
+
+    What a world is stays in a Context, motors have a past, and pushes come at their
+    times, so that every robot needs a Context, and its clock is that of its plan.
+    """
+
+    def __init__(self, config: EnvironmentConfig) -> None:
+        # What the sensors measure is computed for all robots at once.
+        disturbances = replace(config.randomization.disturbances, sensors=False)
+        super().__init__(config, disturbances)
+        self._sample = 0
+
+    def begin(self, domain: Domain, sample: int) -> None:
+        """Begins an episode in ``domain``, at a sample of a plan."""
+        self._sample = sample
+        self._context.SetTime(sample * PLAN_DT)
+        if self._diagram.HasSubsystemNamed("actuation"):
+            actuation = self._diagram.GetSubsystemByName("actuation")
+            # The motors forget the last episode.
+            actuation.SetDefaultContext(
+                actuation.GetMyMutableContextFromRoot(self._context)
+            )
+        SetDomain(self._diagram, self._context, replace(domain, sensors=None))
+        self._simulator.Initialize()
+
+    def advance(self, state: Array, desired_state: Array) -> Array:
+        """Returns the state after a control period; see :class:`SharedWorld`."""
+        self._set(state, desired_state)
+        self._sample += 1
+        return self._advance(self._sample * PLAN_DT)
+
+
+def make_worlds(
+    config: EnvironmentConfig, count: int
+) -> list[SharedWorld] | list[OwnWorld]:
+    """Returns what simulates each of ``count`` robots; by default one for all."""
+    if config.randomization.changes_physics:
+        return [OwnWorld(config) for _ in range(count)]
+    return [SharedWorld(config)] * count

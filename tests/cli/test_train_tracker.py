@@ -1,0 +1,63 @@
+import json
+
+import pytest
+
+from loco_drake.cli.main import main
+from loco_drake.models.robots import get_robot
+from loco_drake.motion import save_motion
+from loco_drake.systems.actor import load_actor
+from loco_drake.tracking.checkpoint import load_checkpoint
+from loco_drake.tracking.randomization import STANDARD
+from tests.synthetic_motion import synthetic_motion
+
+
+@pytest.fixture(scope="module")
+def references(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("references")
+    save_motion(synthetic_motion("dog-trot", 2.0, 0.3), folder / "trot.npz")
+    return folder
+
+
+def train(references, *options):
+    return main(["train", "tracker", "--references", str(references), *options])
+
+
+def test_options_reach_the_training(references, tmp_path, capsys):
+    """One batch in randomized worlds, of a policy without privileged observations."""
+    options = "--steps 1 --workers 1 --randomize --randomization.payload 2 2"
+    options += " --no-privileged --json"
+    out = tmp_path / "run"
+    arguments = [*options.split(), str(tmp_path / "figures.json"), "--out", str(out)]
+    assert train(references, *arguments) == 0
+    assert json.loads((tmp_path / "figures.json").read_text())["steps"] == 4096
+    assert not load_actor(
+        out / "policy.safetensors", get_robot("go2")
+    ).config.privileged
+    _, header = load_checkpoint(out / "checkpoint.safetensors")
+    environment = header["config"]["training"]["environment"]
+    randomization = environment["randomization"]
+    assert randomization["payload"] == [2.0, 2.0]
+    assert randomization["latency"] == list(STANDARD.latency)
+    assert environment["termination"]["position"] == 1.0
+    capsys.readouterr()
+    resumed = ["--resume", "--steps", "1", "--out", str(out)]
+    assert train(references, *resumed) == 2
+    assert "'privileged': False" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--randomization.friction 1.2 .4", "friction must be two numbers"),
+        ("--randomization.noise -1", "noise must be 0 or more"),
+        ("--start-from nowhere.safetensors", "nowhere.safetensors"),
+        ("--start-from x.safetensors --resume", "not both"),
+    ],
+)
+def test_bad_options_are_one_sentence(references, tmp_path, options, message, capsys):
+    out = tmp_path / "run"
+    assert train(references, *options.split(), "--out", str(out)) == 2
+    error = capsys.readouterr().err.strip()
+    assert message in error
+    assert len(error.splitlines()) == 1
+    assert not out.exists()
