@@ -44,7 +44,7 @@ def _work(
                 pipe.send(batch.observe())
             else:
                 pipe.send(_step(batch, actions, next_plans, random))
-    except (EOFError, BrokenPipeError):
+    except (EOFError, ConnectionError):
         pass  # The trainer is gone.
 
 

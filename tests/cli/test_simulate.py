@@ -130,9 +130,11 @@ def test_port_in_use_and_replay(weights, tmp_path, monkeypatch, capsys):
     assert 1e6 < page.stat().st_size < 10e6
 
 
+@pytest.mark.parametrize("robot", ["go2", "a1"])
 @pytest.mark.parametrize("gait", ["dog-pace", "dog-trot"])
-def test_shipped_weights_carry_the_go2_for_ten_seconds(gait, tmp_path):
-    figures = simulate(tmp_path, "--gait", gait, "--seed", 3, "--no-meshcat")
+def test_shipped_weights_carry_the_robots_for_ten_seconds(gait, robot, tmp_path):
+    line = ("--robot", robot, "--gait", gait, "--seed", 3, "--no-meshcat")
+    figures = simulate(tmp_path, *line)
     assert figures["duration_s"] == figures["simulated_s"] == 10.0
     assert not figures["fell"]
     assert figures["normalized_return"] >= 75
