@@ -12,6 +12,7 @@ from the root of the repository:
 import statistics
 import time
 from collections.abc import Callable
+from functools import partial
 
 import torch
 import tyro
@@ -50,7 +51,7 @@ def planning_events(system: Diagram | LeafSystem, seconds: float) -> Times:
     simulator.Initialize()
     end, times = port.Eval(context).end_time, []
     for step in range(1, round(seconds / PERIOD) + 1):
-        cost = timed(lambda now=step * PERIOD: simulator.AdvanceTo(now))
+        cost = timed(partial(simulator.AdvanceTo, step * PERIOD))
         if port.Eval(context).end_time > end:
             end = port.Eval(context).end_time
             times.append(cost)
@@ -110,7 +111,7 @@ def main(
     print("|---|---:|---:|")
     for size in sorted({1, count}):
         costs = [
-            timed(lambda s=size, k=k: generate_motions(model, k, duration, range(s)))
+            timed(partial(generate_motions, model, k, duration, range(size)))
             for k in (parse_label(gait), LABELS[-1], parse_label(gait))
         ][1:]
         made = len(costs) * size * duration

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -115,7 +116,7 @@ class Variant:
         seed: added to that of the command line.
     """
 
-    config: dict[str, int] = field(default_factory=dict)
+    config: dict[str, Any] = field(default_factory=dict)
     off: tuple[str, ...] = ()
     build: Callable[[TokenizerConfig], LearningTokenizer] = residual_tokenizer
     seed: int = 0
@@ -244,7 +245,7 @@ def main(
             )
             tokenizer, result = train_tokenizer(
                 library,
-                replace(TokenizerConfig(robots=library.robots), **variant.config),
+                TokenizerConfig(robots=library.robots, **variant.config),
                 settings,
                 weights={k: w * (k not in variant.off) for k, w in WEIGHTS.items()},
                 build=variant.build,

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -8,6 +10,7 @@ from loco_drake.models.robots import get_robot
 from loco_drake.motion import save_motion
 from loco_drake.systems.actor import Actor, ActorConfig, save_actor
 from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
+from loco_drake.systems.pretrained import policy_path
 from loco_drake.systems.scenario import (
     ExternalAction,
     ExternalTargets,
@@ -149,10 +152,10 @@ def test_open_targets_leave_the_plant_alone():
     np.testing.assert_allclose(knees[1] - knees[0], 0.1, atol=0.03)
 
 
-def test_a_robot_without_weights_says_which_have_some(tmp_path):
-    save_motion(synthetic_motion("dog-trot", 1.0), tmp_path / "x.npz")
-    with pytest.raises(InputError, match="no policy weights for a1"):
-        MakeLocomotionDiagram(Scenario(robot="a1", reference=PlanReference()))
+def test_a_robot_without_weights_says_which_have_some():
+    robot = replace(get_robot("a1"), name="spot")
+    with pytest.raises(InputError, match=r"weights for spot.*for go2, a1"):
+        policy_path(robot)
 
 
 def test_a_scenario_is_read_from_yaml(tmp_path):
