@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from loco_drake.cli.output import print_table, write_json
-from loco_drake.errors import InputError, check_at_least, check_choice
+from loco_drake.errors import check_at_least, check_choice
 from loco_drake.gait_schedule import parse_schedule
 from loco_drake.generation.generate import (
     check_duration,
@@ -65,8 +65,7 @@ class Generate:
         check_pace(self.pace)
         check_choice("robot", self.robot, ROBOTS)
         check_at_least("count", self.count, 1)
-        if self.seed < 0:
-            raise InputError(f"--seed must be 0 or more, not {self.seed}.")
+        check_at_least("seed", self.seed, 0)
         model = load_motion_model(
             self.tokenizer or pretrained_path("tokenizer"),
             self.generator or pretrained_path("generator"),

@@ -258,11 +258,7 @@ def _drift(
     worst = drifting.worst(drifts)
     beyond = {}
     for label in drifts:
-        real = [
-            motion
-            for motion in (*recorded.train, *recorded.validation)
-            if str(motion.label) == label and len(motion) >= FRAMES
-        ]
+        real = [motion for motion in recorded.of(label) if len(motion) >= FRAMES]
         if real:
             beyond[label] = drifting.beyond_recorded(long[label], real)
     return {
@@ -280,11 +276,7 @@ def _by_label(robot: Robot, recorded: Recorded, generated: Generated) -> dict[st
     measured = {name: measure(robot, motions) for name, motions in by_label.items()}
     figures = {}
     for name, of_generated in measured.items():
-        stretches = [
-            motion
-            for motion in (*recorded.train, *recorded.validation)
-            if str(motion.label) == name
-        ]
+        stretches = recorded.of(name)
         cuts = [part for motion in stretches for part in trajectories(motion)]
         of_recordings = measure(robot, cuts or stretches) if stretches else None
         figures[name] = compare(of_generated, of_recordings)

@@ -30,6 +30,11 @@ class Recorded:
     validation: tuple[Motion, ...]
     failed: dict[str, str] = field(default_factory=dict)
 
+    def of(self, label: str) -> list[Motion]:
+        """Returns all stretches of a label, of both sides."""
+        both = (*self.train, *self.validation)
+        return [motion for motion in both if str(motion.label) == label]
+
     @property
     def labels(self) -> tuple[str, ...]:
         """Labels that both sides have a trajectory of, in the order of LABELS."""

@@ -172,7 +172,7 @@ def make_batch(
         start = random.integers(len(sequence) - length)
         windows[i] = sequence.codes[start : start + length + 1]
         speeds = sequence.speeds[start + 1 : start + length + 1]
-        paces[i] = np.searchsorted(edges[sequence.label].numpy(), speeds)
+        paces[i] = pace.speed_bin(edges.numpy(), sequence.label, speeds)
     windows[random.random(batch) < NO_HISTORY, 0] = config.book_size
     before, codes = windows[:, :-1].copy(), windows[:, 1:].copy()
     labels = np.repeat([[sequence.label] for sequence in chosen], length, axis=1)
@@ -213,8 +213,9 @@ def score_generator(
         codes = torch.from_numpy(sequence.codes)[None]
         first = torch.full((1, 1, config.books), config.book_size)
         labels = torch.full(codes.shape[:2], sequence.label)
-        edges = generator.speed_edges[sequence.label].numpy()
-        paces = torch.from_numpy(np.searchsorted(edges, sequence.speeds))[None]
+        edges = generator.speed_edges.numpy()
+        bins = pace.speed_bin(edges, sequence.label, sequence.speeds)
+        paces = torch.from_numpy(bins)[None]
         duration = torch.from_numpy(duration_bin(np.array([LONGEST])))
         before = torch.cat((first, codes[:, :-1]), dim=1)
         with torch.inference_mode(), single_thread():

@@ -149,9 +149,9 @@ class TrackingBatch:
         """Returns states as robots measure them, and rotation matrices if known."""
         if self._config.randomization.noise is None:
             return self._state[robots], self._R_WB[robots]
-        errors = [
-            draw_error(domain.sensors, int(sample))
-            for domain, sample in zip(self._domains, self.sample, strict=True)
-            if domain.sensors is not None
-        ]
-        return measure(self._state[robots], np.array(errors)[robots]), None
+        errors = []
+        for i in np.arange(len(self._state))[robots]:
+            sensors = self._domains[i].sensors
+            assert sensors is not None
+            errors.append(draw_error(sensors, int(self.sample[i])))
+        return measure(self._state[robots], np.array(errors)), None
