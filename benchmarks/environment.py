@@ -33,7 +33,7 @@ from loco_drake.models.plant import AddRobotPlant, ConfigureSimulator, PlantConf
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.systems.plan import PLAN_DT, Plan, plan_from_motion
-from loco_drake.systems.retiming import joint_limits
+from loco_drake.systems.retiming import path_limits
 from loco_drake.systems.toppra_smoother import smooth_plan
 from loco_drake.systems.tracking_reward import reward_terms
 from loco_drake.tracking.batch import TrackingBatch
@@ -54,7 +54,7 @@ ROWS = {
 def make_plans() -> list[Plan]:
     """Returns references such as training uses."""
     robot = get_robot(ROBOT)
-    limits = joint_limits(robot)
+    limits = path_limits(robot)
     model = pretrained_motion_model(ROBOT)
     return [
         smooth_plan(robot, plan_from_motion(robot, motion), limits)

@@ -18,7 +18,7 @@ from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.pretrained import pretrained_motion_model
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.plan import plan_from_motion
-from loco_drake.systems.retiming import joint_limits
+from loco_drake.systems.retiming import path_limits
 from loco_drake.systems.toppra_smoother import smooth_plan
 from loco_drake.tracking.ppo import PpoConfig
 from loco_drake.tracking.train import Progress, TrainingConfig, train_tracker
@@ -51,7 +51,7 @@ def train(
             model, parse_label(gait), seconds, range(references)
         )
     ]
-    limits = joint_limits(robot)
+    limits = path_limits(robot)
     plans = [smooth_plan(robot, plan_from_motion(robot, m), limits) for m in motions]
     print(f"{len(plans)} references of {seconds:g} s")
 

@@ -12,6 +12,7 @@ from toppra.interpolator import AbstractGeometricPath
 
 from loco_drake.models.robots import Robot
 
+from .feed_forward import GRAVITY
 from .plan import PLAN_DT
 
 Array = NDArray[np.float64]
@@ -24,32 +25,40 @@ _CLOCK_STOP_TIME = 0.05
 
 
 @dataclass(frozen=True)
-class JointLimits:
-    """What the actuators can do.
+class PathLimits:
+    """What each coordinate of a path can do.
 
     Attributes:
-        speed: rad/s, shape (J,).
-        acceleration: rad/s², shape (J,).
+        speed: at most this, in both directions, shape (D,).
+        acceleration: from the first to the second, shape (D, 2).
     """
 
     speed: Array
     acceleration: Array
 
 
-def joint_limits(robot: Robot) -> JointLimits:
-    """Returns the robot's limits on joint speed and acceleration.
+def path_limits(robot: Robot) -> PathLimits:
+    """Returns the robot's limits on its joints (rad) and the height of its base (m).
 
     The acceleration that a joint can give its leg is ``effort_limit /
     joint_inertia``: an upper bound for a leg in swing, where fast joint
     motion happens. A leg in stance also carries load, but hardly accelerates.
+
+    The base cannot fall faster than gravity makes it, since feet push but do not
+    pull. Motion of an animal or robot smaller than this one asks for that where all
+    feet are in the air; slowed until it falls like any body, it can be followed.
     """
-    return JointLimits(
-        robot.joint_speed_limits, robot.effort_limits / robot.joint_inertia
+    joints = robot.effort_limits / robot.joint_inertia
+    return PathLimits(
+        speed=np.append(robot.joint_speed_limits, np.inf),
+        acceleration=np.append(
+            np.stack((-joints, joints), axis=1), [[-GRAVITY, np.inf]], axis=0
+        ),
     )
 
 
-class _JointPath(AbstractGeometricPath):
-    """Joint angles over plan time, and plan time itself as the last coordinate.
+class _ClockedPath(AbstractGeometricPath):
+    """Coordinates over plan time, and plan time itself as the last of them.
 
     Limiting the speed of that last coordinate to 1 is what keeps TOPP-RA, which is
     time-optimal, from playing the plan faster than it was written.
@@ -99,15 +108,15 @@ class Clock:
 
 def retime(
     times: Array,
-    joints: Array,
-    limits: JointLimits,
+    waypoints: Array,
+    limits: PathLimits,
     *,
     start: float,
     end: float,
     commit: float,
     start_rate: float = 1.0,
 ) -> Clock:
-    """Re-times the path through ``joints`` so that it keeps within ``limits``.
+    """Re-times the path through ``waypoints`` so that it keeps within ``limits``.
 
     Where the plan is feasible as written it is left exactly alone. Otherwise TOPP-RA
     (Pham and Pham 2018) finds the fastest clock that is never faster than the plan.
@@ -115,7 +124,7 @@ def retime(
     Args:
         times: plan times of the waypoints in s, shape (N,); may reach beyond
             ``start`` and ``end``, which makes the spline independent of both.
-        joints: waypoints in rad, shape (N, J).
+        waypoints: coordinates there, shape (N, D).
         limits: what must hold.
         start: plan time at which to start.
         end: plan time up to which the limits are to be satisfied.
@@ -127,7 +136,7 @@ def retime(
         The clock from ``start`` on, at multiples of PLAN_DT of real time, for as long
         as it has not passed ``commit``.
     """
-    spline = CubicSpline(times, joints)
+    spline = CubicSpline(times, waypoints)
     count = max(2, round((end - start) / (0.5 * PLAN_DT)))
     grid = np.linspace(start, end, count + 1)
     if start_rate > 1 - 1e-6 and _feasible(spline, grid, limits):
@@ -138,24 +147,27 @@ def retime(
     return _sample(grid, rates, commit)
 
 
-def _feasible(spline: CubicSpline, grid: Array, limits: JointLimits) -> bool:
+def _feasible(spline: CubicSpline, grid: Array, limits: PathLimits) -> bool:
+    acceleration = spline(grid, 2)
     return bool(
         (np.abs(spline(grid, 1)) <= limits.speed).all()
-        and (np.abs(spline(grid, 2)) <= limits.acceleration).all()
+        and (acceleration >= limits.acceleration[:, 0]).all()
+        and (acceleration <= limits.acceleration[:, 1]).all()
     )
 
 
 def _solve(
-    spline: CubicSpline, grid: Array, limits: JointLimits, start_rate: float
+    spline: CubicSpline, grid: Array, limits: PathLimits, start_rate: float
 ) -> Array:
     """Returns ds/dt at the grid points by TOPP-RA."""
     speed = np.append(limits.speed, 1.0)
-    acceleration = np.append(limits.acceleration, 1.0 / _CLOCK_STOP_TIME)
+    clock = [[-1.0 / _CLOCK_STOP_TIME, 1.0 / _CLOCK_STOP_TIME]]
+    acceleration = np.append(limits.acceleration, clock, axis=0)
     constraints = [
         JointVelocityConstraint(np.stack((-speed, speed), axis=1)),
-        JointAccelerationConstraint(np.stack((-acceleration, acceleration), axis=1)),
+        JointAccelerationConstraint(acceleration),
     ]
-    path = _JointPath(spline, grid[0], grid[-1])
+    path = _ClockedPath(spline, grid[0], grid[-1])
     solver = _FreeEndTOPPRA(constraints, path, gridpoints=grid, solver_wrapper="seidel")
     controllable = np.sqrt(solver.compute_controllable_sets(0.0, 1.0)[0])
     # A plan that starts outside the limits leaves no choice but a jump of the clock.

@@ -13,7 +13,7 @@ from loco_drake.models.robots import Robot
 from loco_drake.rotations import quat_continuous
 
 from .plan import PLAN_DT, Plan, join_plans, make_plan, standing_plan
-from .retiming import Clock, JointLimits, joint_limits, retime
+from .retiming import Clock, PathLimits, path_limits, retime
 
 Array = NDArray[np.float64]
 
@@ -74,12 +74,12 @@ class ToppraSmoother(LeafSystem):
         self,
         robot: Robot,
         config: SmootherConfig | None = None,
-        limits: JointLimits | None = None,
+        limits: PathLimits | None = None,
     ) -> None:
         super().__init__()
         self._robot = robot
         self._config = config or SmootherConfig()
-        self._limits = limits or joint_limits(robot)
+        self._limits = limits or path_limits(robot)
         rest = standing_plan(robot)
         self._plan_in = self.DeclareAbstractInputPort("plan", Value(rest))
         self._progress = self.DeclareAbstractState(Value(_Progress(rest)))
@@ -148,7 +148,7 @@ class ToppraSmoother(LeafSystem):
 
 
 def smooth_chunk(
-    robot: Robot, limits: JointLimits, progress: _Progress, raw: Plan, chunk: float
+    robot: Robot, limits: PathLimits, progress: _Progress, raw: Plan, chunk: float
 ) -> _Progress | None:
     """Returns ``progress`` with one more chunk, or None if ``raw`` is too short.
 
@@ -169,7 +169,7 @@ def smooth_chunk(
     )
     clock = retime(
         raw.path_time[window],
-        raw.q[window, 7:],
+        np.column_stack((raw.q[window, 7:], raw.q[window, 6])),
         limits,
         start=start,
         end=end,
@@ -213,7 +213,7 @@ def _follow(robot: Robot, raw: Plan, window: slice, clock: Clock, start: float) 
 
 
 def smooth_plan(
-    robot: Robot, raw: Plan, limits: JointLimits, chunk: float = 0.96
+    robot: Robot, raw: Plan, limits: PathLimits, chunk: float = 0.96
 ) -> Plan:
     """Returns the whole of ``raw``, re-timed chunk by chunk as the system does it."""
     progress = _Progress(standing_plan(robot, raw.start_time))

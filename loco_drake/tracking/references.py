@@ -10,13 +10,13 @@ from loco_drake.generation.pretrained import pretrained_motion_model
 from loco_drake.models.robots import Robot
 from loco_drake.motion import Motion, load_motion
 from loco_drake.systems.plan import Plan, plan_from_motion
-from loco_drake.systems.retiming import joint_limits
+from loco_drake.systems.retiming import path_limits
 from loco_drake.systems.toppra_smoother import smooth_plan
 
 
 def smooth_motions(robot: Robot, motions: Iterable[Motion]) -> list[Plan]:
     """Returns motions as plans, re-timed by the smoother."""
-    limits = joint_limits(robot)
+    limits = path_limits(robot)
     return [
         smooth_plan(robot, plan_from_motion(robot, motion), limits)
         for motion in motions

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.plan import PLAN_DT
-from loco_drake.systems.retiming import JointLimits, joint_limits, retime
+from loco_drake.systems.retiming import PathLimits, path_limits, retime
 
 TIMES = np.arange(151) * PLAN_DT
 MARGIN = 0.5  # s of waypoints before and after what is timed
@@ -22,7 +22,7 @@ def swing(amplitude, frequency, burst=True):
 
 
 def limits(speed, acceleration):
-    return JointLimits(np.full(2, speed), np.full(2, acceleration))
+    return PathLimits(np.full(2, speed), np.tile([-acceleration, acceleration], (2, 1)))
 
 
 def timed(joints, limit, start_rate=1.0):
@@ -52,7 +52,7 @@ def test_an_infeasible_plan_keeps_the_limits_and_is_never_faster(limit):
     # Finite differences of what is played, which know nothing of the solver.
     played = spline(clock.path_time)
     acceleration = np.diff(played, n=2, axis=0) / PLAN_DT**2
-    assert np.abs(acceleration).max() <= limit.acceleration[0] * 1.02
+    assert np.abs(acceleration).max() <= limit.acceleration[0, 1] * 1.02
     # It is slow only where it must be.
     assert clock.rate[0] == pytest.approx(1.0, abs=1e-3)
     assert clock.rate[-1] == pytest.approx(1.0, abs=1e-3)
@@ -120,6 +120,26 @@ def test_limits_come_from_effort_and_inertia():
     robot = get_robot("go2")
     inertia = robot.reflected_inertia[2] + 0.154 * (0.115**2 + 0.00548**2)
     inertia += 0.0011 + 0.04 * 0.213**2  # about the calf's own centre; the foot
-    limit = joint_limits(robot)
-    assert limit.acceleration[2] == pytest.approx(35.55 / inertia, rel=0.02)
-    np.testing.assert_array_equal(limit.speed, robot.joint_speed_limits)
+    limit = path_limits(robot)
+    assert limit.acceleration[2, 1] == pytest.approx(35.55 / inertia, rel=0.02)
+    np.testing.assert_array_equal(limit.acceleration[:12, 0], -limit.acceleration[:12, 1])
+    np.testing.assert_array_equal(limit.speed[:12], robot.joint_speed_limits)
+
+
+def test_a_hop_is_slowed_until_it_falls_like_any_body():
+    """A hop whose flight falls with 1.96 g must last sqrt(1.96) = 1.4 times as long."""
+    limit = PathLimits(np.array([np.inf]), np.array([[-9.81, np.inf]]))
+    period, share, height = 0.4, 0.5, 0.5 * 1.96 * 9.81 * 0.1**2
+    phase = TIMES / period % 1.0
+    flight = height * (1 - ((phase - share / 2) / (share / 2)) ** 2)
+    stance = height * (((phase - 1 + share / 2) / (share / 2)) ** 2 - 1)
+    z = np.where(phase < share, flight, stance)[:, None]
+    clock = timed(z, limit)
+    played = CubicSpline(TIMES, z)(clock.path_time)[:, 0]
+    fall = np.diff(played, n=2) / PLAN_DT**2
+    assert fall.min() >= -9.81 * 1.1  # samples and corners of the spline
+    airborne = CubicSpline(TIMES, z)(clock.path_time, 2)[:, 0] < -15
+    assert clock.rate[airborne].mean() == pytest.approx(1 / 1.4, abs=0.06)
+    # Pushing off may be as hard as it likes.
+    assert fall.max() > 12.0
+    assert clock.rate.max() == pytest.approx(1.0, abs=1e-3)
