@@ -24,6 +24,7 @@ from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.ppo import PpoConfig
 from loco_drake.tracking.randomization import RandomizationConfig
 from loco_drake.tracking.references import load_references
+from loco_drake.tracking.terminations import TerminationConfig
 from loco_drake.tracking.train import Progress as TrainingProgress
 from loco_drake.tracking.train import TrainingConfig, train_tracker
 
@@ -56,6 +57,8 @@ class TrainTracker:
     every part of --randomization that is not given gets its standard range."""
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
     """Single parts of it; a range is two numbers."""
+    termination: TerminationConfig = field(default_factory=TerminationConfig)
+    """How far from its plan a robot may be before its episode ends."""
     privileged: bool = True
     """Whether the policy sees where in the world the base is and how fast it moves,
     which a robot outside simulation does not know well."""
@@ -81,12 +84,16 @@ class TrainTracker:
                 f"{environments} environments, not {self.batch}."
             )
         self.plant.check()
+        self.termination.check()
         randomization = self.randomization
         if self.randomize:
             randomization = randomization.with_standard()
         randomization.check()
         environment = EnvironmentConfig(
-            robot=self.robot, plant=self.plant, randomization=randomization
+            robot=self.robot,
+            plant=self.plant,
+            termination=self.termination,
+            randomization=randomization,
         )
         if not self.privileged:
             environment = environment.without_position()

@@ -14,11 +14,12 @@ _SHORTEST = 0.05  # share of an episode that the shortest are taken to last
 
 
 class PlanSampler:
-    """Draws labels so that they get steps in proportion to what they lack; then a plan.
+    """Draws labels so that they get steps for what they lack; then one of its plans.
 
-    A gait's share of the *steps*, not of the episodes, is proportional to the return
-    that it lacks, within bounds: episodes that end in an early fall are short, and what
-    falls would hardly be practised otherwise.
+    A gait's share of the *steps*, not of the episodes, is proportional to the square of
+    the return that it lacks, within bounds: episodes that end in an early fall are
+    short, and what falls would hardly be practised otherwise; and most of what a gait
+    lacks in training, some ten of a hundred, is the noise of the actions.
 
     Args:
         plans: what to draw from; the label of a plan is that of its first sample.
@@ -37,7 +38,7 @@ class PlanSampler:
     def draw(self) -> int:
         """Returns the index of a plan."""
         lack = np.clip(1 - self.scores[self.present], _LEAST, _MOST)
-        episodes = lack / np.maximum(self.shares[self.present], _SHORTEST)
+        episodes = lack**2 / np.maximum(self.shares[self.present], _SHORTEST)
         label = self.random.choice(self.present, p=episodes / episodes.sum())
         return int(self.random.choice(np.flatnonzero(self._labels == label)))
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.errors import InputError
 from loco_drake.models.robots import Robot
 from loco_drake.systems.fall import has_fallen
 
@@ -23,6 +24,15 @@ class TerminationConfig:
 
     position: float = 0.35
     rotation: float = 0.8
+
+    def check(self) -> None:
+        """Raises InputError unless both are above 0."""
+        for name in ("position", "rotation"):
+            value = getattr(self, name)
+            if not value > 0:
+                raise InputError(
+                    f"The termination's {name} must be above 0, not {value}."
+                )
 
 
 def is_lost(

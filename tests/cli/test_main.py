@@ -161,6 +161,9 @@ WRONG = {
     "train tracker --references FILES/empty --robot spot": "the choices are go2, a1",
     "train tracker --references FILES/empty --batch 9": "--batch must be at least 32",
     "train tracker --references FILES/empty --steps 0": "steps must be at least 1",
+    "train tracker --references FILES/empty --termination.position 0": (
+        "position must be above 0, not 0"
+    ),
 }
 
 

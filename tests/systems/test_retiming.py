@@ -122,7 +122,9 @@ def test_limits_come_from_effort_and_inertia():
     inertia += 0.0011 + 0.04 * 0.213**2  # about the calf's own centre; the foot
     limit = path_limits(robot)
     assert limit.acceleration[2, 1] == pytest.approx(35.55 / inertia, rel=0.02)
-    np.testing.assert_array_equal(limit.acceleration[:12, 0], -limit.acceleration[:12, 1])
+    np.testing.assert_array_equal(
+        limit.acceleration[:12, 0], -limit.acceleration[:12, 1]
+    )
     np.testing.assert_array_equal(limit.speed[:12], robot.joint_speed_limits)
 
 
