@@ -20,8 +20,10 @@ Array = NDArray[np.float64]
 # toppra tells of infeasible problems through its logger; here they are results.
 toppra.setup_logging("ERROR")
 
-# The path clock may slow from full speed to rest in no less than this many seconds.
-_CLOCK_STOP_TIME = 0.05
+# The path clock may slow from full speed to rest in no less than this many seconds:
+# what it does to the plan's speed is done to the whole robot, which is in the air at
+# times, and on the ground brakes at no more than friction allows.
+_CLOCK_STOP_TIME = 0.5
 
 
 @dataclass(frozen=True)

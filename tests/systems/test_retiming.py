@@ -71,7 +71,7 @@ def test_drakes_own_toppra_finds_the_same_duration():
     )
     toppra = Toppra(path, _three_sliders(), grid)
     toppra.AddJointVelocityLimit([-3, -3, 0], [3, 3, 1])
-    toppra.AddJointAccelerationLimit([-40, -40, -20], [40, 40, 20])
+    toppra.AddJointAccelerationLimit([-40, -40, -2], [40, 40, 2])
     theirs = toppra.SolvePathParameterization(1.0, 1.0)
     clock = timed(joints, limit)
     duration = (len(clock.path_time) - 1) * PLAN_DT
@@ -111,8 +111,10 @@ def test_it_goes_on_from_the_rate_it_is_given():
     clock = timed(swing(0.3, 2.0), limits(10.0, 100.0), start_rate=0.5)
     assert clock.rate[0] == pytest.approx(0.5)
     assert clock.rate[-1] == pytest.approx(1.0)
-    # From 1/2 to 1 within the 25 ms that the clock's own limit allows.
-    assert len(clock.path_time) <= 102
+    # From 1/2 to 1 at the 2 per s that the clock's own limit allows: .25 s, in which
+    # it falls behind by a quarter of that.
+    late = PLAN_DT * (len(clock.path_time) - 1) - (2.5 - MARGIN)
+    assert late == pytest.approx(0.25 / 4, abs=PLAN_DT)
 
 
 def test_limits_come_from_effort_and_inertia():
@@ -142,6 +144,6 @@ def test_a_hop_is_slowed_until_it_falls_like_any_body():
     assert fall.min() >= -9.81 * 1.1  # samples and corners of the spline
     airborne = CubicSpline(TIMES, z)(clock.path_time, 2)[:, 0] < -15
     assert clock.rate[airborne].mean() == pytest.approx(1 / 1.4, abs=0.06)
-    # Pushing off may be as hard as it likes.
+    # Pushing off may be as hard as it likes, and is slowed by what the clock needs.
     assert fall.max() > 12.0
-    assert clock.rate.max() == pytest.approx(1.0, abs=1e-3)
+    assert clock.rate.max() > 0.9
