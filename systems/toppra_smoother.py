@@ -48,7 +48,7 @@ class _Progress:
 
 
 class ToppraSmoother(LeafSystem):
-    """Re-times the incoming plan so that joint speeds and accelerations keep limits.
+    """Re-times the incoming plan so that joints and base keep :func:`path_limits`.
 
     .. pydrake_system::
 
