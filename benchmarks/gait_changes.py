@@ -42,11 +42,13 @@ def main(robot: str = "go2", count: int = 4, rows: int = 8) -> None:
     }
     lowest, highest = ({k: f(v) for k, v in speed.items()} for f in (min, max))
     found = []
+    peaks: list[dict[str, float]] = []
     first = round((BEFORE + SETTLED) * FPS)
     for a, b in permutations(known, 2):
         schedule = GaitSchedule((a, b), (0.0, BEFORE))
         for motion in generate_motions(model, schedule, BEFORE + AFTER, seeds):
             rough = roughness(motion, BEFORE, [*steady[a], *steady[b]])
+            peaks.append(rough)
             worst = max(rough, key=lambda key: rough[key])
             settled = forward_speed(model.robot, motion)[first:].mean()
             beyond = max(lowest[b] - settled, settled - highest[b], 0.0)
@@ -58,6 +60,12 @@ def main(robot: str = "go2", count: int = 4, rows: int = 8) -> None:
     print(f"most {ratios.max():.2f}, above 1: {(ratios > 1).mean():.1%}")
     print(f"speed {SETTLED:g} s after, beyond that of all {count} motions of", end=" ")
     print(f"the gait: median {np.median(beyond):.2f} m/s, most {beyond.max():.2f}")
+    print("\n| peak over those of the gaits | median | most | above 1, % |")
+    print("|---|---:|---:|---:|")
+    for key in peaks[0]:
+        each = np.array([rough[key] for rough in peaks])
+        share = 100 * (each > 1).mean()
+        print(f"| {key} | {np.median(each):.2f} | {each.max():.2f} | {share:.1f} |")
     print("\n| change | roughest in | over the gaits' |\n|---|---|---:|")
     for ratio, worst, _, name in sorted(found, reverse=True)[:rows]:
         print(f"| {name} | {worst} | {ratio:.2f} |")
