@@ -24,13 +24,18 @@ from loco_drake.tracking.references import smooth_motions
 from loco_drake.tracking.sampler import PlanSampler
 from tests.synthetic_motion import synthetic_motion
 
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "one_policy.py"
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 TINY = PpoConfig(batch=32, minibatch=32, epochs=1, hidden=[16, 8])
 
 
 @pytest.fixture(scope="module")
 def script():
-    return runpy.run_path(str(SCRIPT))
+    """What both files define."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(BENCHMARKS))
+        names = ("both_robots", "one_policy")
+        both, trial = (runpy.run_path(str(BENCHMARKS / f"{n}.py")) for n in names)
+    return both | trial
 
 
 @pytest.fixture(scope="module")
