@@ -98,7 +98,11 @@ def checkpoint(folder: Path, robot: str) -> Path:
 
 
 def score(
-    learner: AdaptivePPO, robot: str, plans: Sequence[Plan], per_label: int
+    learner: AdaptivePPO,
+    robot: str,
+    plans: Sequence[Plan],
+    per_label: int,
+    told: str | None = None,
 ) -> Scores:
     """Returns by label the mean normalized return and the share of episodes lost, %.
 
@@ -107,7 +111,9 @@ def score(
         robot: name of the robot.
         plans: of the robot; the first of each label are followed from their start.
         per_label: plans of each label.
+        told: the robot that the observations name, by default ``robot``.
     """
+    told = told or robot
     config = EnvironmentConfig(robot=robot, reset_noise=NO_NOISE)
     labels = np.array([int(plan.labels[0]) for plan in plans])
     chosen = np.concatenate(
@@ -123,7 +129,7 @@ def score(
         batch.reset(i, random, i, 0)
     returns, follows = np.zeros(len(chosen)), np.ones(len(chosen), dtype=bool)
     for _ in range(config.episode_steps):
-        seen: Any = normalizer.normalize_obs(with_robot(batch.observe(), robot))
+        seen: Any = normalizer.normalize_obs(with_robot(batch.observe(), told))
         terms, lost, _ = batch.step(learner.predict(seen, deterministic=True)[0])
         returns += follows * terms.sum(axis=-1)
         follows &= ~lost
@@ -174,8 +180,9 @@ def train_and_score(
 
     Returns:
         "steps" of each robot, "processor_s" of trainer and workers (None of a training
-        that was stopped in between), "log", the lines of the log, and "scores" by robot
-        and label.
+        that was stopped in between), "log", the lines of the log, and by robot and
+        label "scores" and, of a training on several robots, "mistaken", the scores with
+        observations that name the other robot.
     """
     folder.mkdir(parents=True, exist_ok=True)
     resumed = all(checkpoint(folder, name).exists() for name in robots)
@@ -214,14 +221,18 @@ def train_and_score(
     spent = _processor_s() - before
     lines = folder / PROGRESS
     text = lines.read_text().splitlines() if lines.exists() else []
+    plans, count = settings.plans, settings.per_label
+    scores = {name: score(learner, name, plans[name], count) for name in ROBOTS}
+    mistaken = {}
+    if steps and len(robots) > 1:
+        for name, other in zip(ROBOTS, reversed(ROBOTS), strict=True):
+            mistaken[name] = score(learner, name, plans[name], count, other)
     return {
         "steps": learner.num_timesteps / len(robots),
         "processor_s": None if resumed else spent,
         "log": [json.loads(line) for line in text],
-        "scores": {
-            name: score(learner, name, plans, settings.per_label)
-            for name, plans in settings.plans.items()
-        },
+        "scores": scores,
+        "mistaken": mistaken,
     }
 
 
@@ -231,6 +242,11 @@ def _processor_s() -> float:
         for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     ]
     return sum(each.ru_utime + each.ru_stime for each in used)
+
+
+def mean(scores: Scores, figure: str = "return") -> str:
+    """Returns the mean over the labels, for a table."""
+    return f"{np.mean([each[figure] for each in scores.values()]):.1f}"
 
 
 def in_training(result: dict[str, Any], robot: str, steps: int) -> str:
@@ -244,23 +260,24 @@ def in_training(result: dict[str, Any], robot: str, steps: int) -> str:
 def print_tables(results: Mapping[str, dict[str, Any]]) -> None:
     """Prints a row for each policy and robot, then one for each label."""
     points = [f"{point / 1e6:.2f}M" for point in POINTS]
-    print(f"| robot | policy | {' | '.join(points)} | return | least | lost, % | min |")
-    print("|---|---" + "|---:" * (len(POINTS) + 4) + "|")
+    columns = ["robot", "policy", *points, "return", "mistaken", "least", "lost, %"]
+    print(f"| {' | '.join([*columns, 'min'])} |")
+    print("|---|---" + "|---:" * (len(columns) - 1) + "|")
     for robot in ROBOTS:
         for name, result in results.items():
             scores = result["scores"][robot]
-            returns = {label: each["return"] for label, each in scores.items()}
-            worst = min(returns, key=lambda label: returns[label])
-            lost = np.mean([each["lost"] for each in scores.values()])
+            worst = min(scores, key=lambda label: scores[label]["return"])
+            mistaken = result["mistaken"].get(robot)
             spent = result["processor_s"]
             cells = [
                 robot,
                 name,
                 *(in_training(result, robot, point) for point in POINTS),
-                f"{np.mean(list(returns.values())):.1f}",
-                f"{returns[worst]:.1f} ({worst})",
-                f"{lost:.1f}",
-                "" if spent is None or not result["log"] else f"{spent / 60:.1f}",
+                mean(scores),
+                mean(mistaken) if mistaken else "",
+                f"{scores[worst]['return']:.1f} ({worst})",
+                mean(scores, "lost"),
+                f"{spent / 60:.1f}" if spent and result["log"] else "",
             ]
             print(f"| {' | '.join(cells)} |")
     names = [f"{robot}: {name}" for robot in ROBOTS for name in results]

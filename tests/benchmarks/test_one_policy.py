@@ -208,6 +208,7 @@ def test_a_stopped_training_goes_on_from_its_checkpoints(
     assert half["processor_s"] > 0
     assert whole["processor_s"] is None
     assert set(whole["scores"]) == {"go2", "a1"}
+    assert whole["mistaken"] == {}
     moments, header = load_checkpoint(tmp_path / "a1.safetensors")
     assert header["state"]["steps"] == 64
     assert float(moments["optimizer/0/step"]) == 2  # gradient steps, one an update
