@@ -9,8 +9,12 @@ from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
 
 from loco_drake.systems.actor import OBSERVATION_CLIP, Actor, ActorConfig
-from loco_drake.systems.observation import OBSERVATION_SIZE
-from loco_drake.tracking.symmetric_policy import SymmetricPolicy, SymmetricStatistics
+from loco_drake.systems.symmetry import mirror_observations
+from loco_drake.tracking.symmetric_policy import (
+    Mirror,
+    SymmetricPolicy,
+    SymmetricStatistics,
+)
 
 
 @dataclass(kw_only=True)
@@ -104,15 +108,29 @@ class AdaptivePPO(PPO):
         optimizers.param_groups[0]["lr"] = self.rate
 
 
-def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
-    """Returns a learner on ``environment``, its observations normalized."""
+def make_ppo(
+    environment: VecEnv,
+    config: PpoConfig,
+    seed: int,
+    mirror: Mirror = mirror_observations,
+) -> AdaptivePPO:
+    """Returns a learner on ``environment``, its observations normalized.
+
+    Args:
+        environment: what to learn in.
+        config: how to learn.
+        seed: of everything random.
+        mirror: of the environment's observations.
+    """
     normalized = VecNormalize(
         ScaleReward(environment, config.gamma),
         norm_reward=False,
         clip_obs=OBSERVATION_CLIP,
         gamma=config.gamma,
     )
-    normalized.obs_rms = cast(Any, SymmetricStatistics(shape=(OBSERVATION_SIZE,)))
+    shape = environment.observation_space.shape
+    assert shape is not None
+    normalized.obs_rms = cast(Any, SymmetricStatistics(shape, mirror))
     learner = AdaptivePPO(
         SymmetricPolicy,
         normalized,
@@ -130,6 +148,7 @@ def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
             "activation_fn": torch.nn.ELU,
             "log_std_init": config.log_std,
             "privileged": config.privileged,
+            "mirror": mirror,
         },
         seed=seed,
         device="cpu",

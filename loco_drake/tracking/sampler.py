@@ -16,17 +16,20 @@ _SHORTEST = 0.05  # share of an episode that the shortest are taken to last
 class PlanSampler:
     """Draws labels so that they get steps for what they lack; then one of its plans.
 
-    A gait's share of the *steps*, not of the episodes, is proportional to the square of
+    A gait's share of the *steps*, not of the episodes, is proportional to a power of
     the return that it lacks, within bounds: episodes that end in an early fall are
-    short, and what falls would hardly be practised otherwise; and most of what a gait
-    lacks in training, some ten of a hundred, is the noise of the actions.
+    short, and what falls would hardly be practised otherwise. The power is the square,
+    since most of what a gait lacks in training, some ten of a hundred, is the noise of
+    the actions.
 
     Args:
         plans: what to draw from; the label of a plan is that of its first sample.
         seed: of the draws.
+        power: of the lack.
     """
 
-    def __init__(self, plans: list[Plan], seed: int) -> None:
+    def __init__(self, plans: list[Plan], seed: int, power: float = 2.0) -> None:
+        self._power = power
         self._labels = np.array([int(plan.labels[0]) for plan in plans])
         self.present = np.unique(self._labels)
         # Mean normalized return of recent episodes, 0 to 1, by label.
@@ -38,7 +41,7 @@ class PlanSampler:
     def draw(self) -> int:
         """Returns the index of a plan."""
         lack = np.clip(1 - self.scores[self.present], _LEAST, _MOST)
-        episodes = lack**2 / np.maximum(self.shares[self.present], _SHORTEST)
+        episodes = lack**self._power / np.maximum(self.shares[self.present], _SHORTEST)
         label = self.random.choice(self.present, p=episodes / episodes.sum())
         return int(self.random.choice(np.flatnonzero(self._labels == label)))
 

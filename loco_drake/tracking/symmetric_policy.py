@@ -1,5 +1,6 @@
 """Actor and critic that treat left and right alike; see :mod:`..systems.symmetry`."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ from torch import Tensor
 from loco_drake.systems.actor import unprivileged_mask
 from loco_drake.systems.symmetry import mirror_actions, mirror_observations
 
+# What the mirror image of the robot observes, of arrays and of tensors.
+Mirror = Callable[[Any], Any]
+
 
 class SymmetricPolicy(ActorCriticPolicy):
     """stable-baselines3's policy, averaged over the robot and its mirror image.
@@ -25,13 +29,21 @@ class SymmetricPolicy(ActorCriticPolicy):
         privileged: whether the actor sees all of the observation; the critic, which is
             needed in training only, always does (Pinto et al. 2018, "Asymmetric actor
             critic").
+        mirror: of the observations.
         **kwargs: as of ActorCriticPolicy.
     """
 
     _mask: Tensor
 
-    def __init__(self, *args: Any, privileged: bool = True, **kwargs: Any) -> None:
+    def __init__(
+        self,
+        *args: Any,
+        privileged: bool = True,
+        mirror: Mirror = mirror_observations,
+        **kwargs: Any,
+    ) -> None:
         super().__init__(*args, **kwargs)
+        self._mirror = mirror
         self._privileged = privileged
         self.register_buffer("_mask", unprivileged_mask(), persistent=False)
 
@@ -59,7 +71,7 @@ class SymmetricPolicy(ActorCriticPolicy):
         return self._evaluate(obs)[1]
 
     def _evaluate(self, obs: Any) -> tuple[Distribution, Tensor]:
-        seen = torch.cat((obs, mirror_observations(obs)))
+        seen = torch.cat((obs, self._mirror(obs)))
         latent_vf = self.mlp_extractor.forward_critic(seen)
         if not self._privileged:
             seen = seen * self._mask
@@ -72,8 +84,19 @@ class SymmetricPolicy(ActorCriticPolicy):
 
 
 class SymmetricStatistics(RunningMeanStd):
-    """Mean and variance of observations and their mirror images."""
+    """Mean and variance of observations and their mirror images.
+
+    Args:
+        shape: of an observation.
+        mirror: of the observations.
+    """
+
+    def __init__(
+        self, shape: tuple[int, ...], mirror: Mirror = mirror_observations
+    ) -> None:
+        super().__init__(shape=shape)
+        self._mirror = mirror
 
     def update(self, arr: NDArray[Any]) -> None:
-        """Takes observations (N, OBSERVATION_SIZE) into account."""
-        super().update(np.concatenate((arr, mirror_observations(arr))))
+        """Takes observations (N, size) into account."""
+        super().update(np.concatenate((arr, self._mirror(arr))))

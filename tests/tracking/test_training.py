@@ -218,6 +218,15 @@ def test_the_sampler_prefers_what_lacks_most(plans):
     assert share == pytest.approx(1 / 2, abs=0.03)
 
 
+def test_the_sampler_prefers_by_the_power_it_is_given(plans):
+    """With 1, five draws in six are a pace."""
+    sampler = PlanSampler(plans, 0, power=1.0)
+    sampler.scores[TROT], sampler.scores[PACE] = 0.9, 0.5
+    draws = np.array([sampler.draw() for _ in range(3000)])
+    share = np.mean([plans[i].labels[0] == PACE for i in draws])
+    assert share == pytest.approx(5 / 6, abs=0.03)
+
+
 def test_gaits_that_fall_early_still_get_their_steps(plans):
     """Both lack half; trots last a tenth of an episode, so ten are drawn for a pace."""
     sampler = PlanSampler(plans, 0)
