@@ -40,7 +40,7 @@ CONDITIONS = {
     "retargeted": (
         "recorded references",
         "stretches of recordings instead of generated motion",
-        "--reference retargeted --seeds 10",
+        "--reference retargeted",
     ),
     "cenic": (
         "CENIC",
@@ -55,12 +55,12 @@ CONDITIONS = {
     "randomized": (
         "randomized worlds",
         "friction, masses, motors, delays and sensors drawn anew for each episode",
-        "--randomize --seeds 10",
+        "--randomize --seeds 5",
     ),
     "pushes": (
         "pushes",
-        "the robot is pushed from random sides, by .5 m/s every 2 s",
-        "--pushes --seeds 10",
+        "the robot is pushed from random sides, by 1 m/s every 2 s",
+        "--pushes --seeds 5",
     ),
 }
 
