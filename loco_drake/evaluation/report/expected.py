@@ -35,7 +35,7 @@ CONDITIONS = {
     "generated": (
         "as trained",
         "references that the generator writes, the contact of the training",
-        "--seeds 10",
+        "--seeds 20",
     ),
     "retargeted": (
         "recorded references",
