@@ -336,7 +336,7 @@ def main(
         workers=1,
         per_worker=per_worker,
         environment=EnvironmentConfig(robot=ROBOT),
-        ppo=PpoConfig(batch=batch),
+        ppo=PpoConfig(batch=batch, minibatch=min(batch, PpoConfig.minibatch)),
     )
     columns = ["return", "least", "most", *labels, "beginning", "end", "falls, %"]
     print(f"| {steps} steps | {' | '.join(columns)} |")
