@@ -174,8 +174,8 @@ VARIANTS = {
         patches={"ppo.SymmetricPolicy": NearPolicy}, actor=NearActor
     ),
     "starts where plans begin": Variant(patches={"workers._work": work_from_beginning}),
-    "learning rate fixed": Variant(patches={"ppo.AdaptivePPO": SteadyPPO}),
     "ends by falls only": Variant(environment={"termination": ONLY_FALLS}),
+    "learning rate fixed": Variant(patches={"ppo.AdaptivePPO": SteadyPPO}),
 }
 
 
