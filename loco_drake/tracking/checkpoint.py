@@ -37,6 +37,8 @@ def save_checkpoint(
     tensors["normalizer/variance"] = torch.from_numpy(statistics.var)
     tensors["sampler/scores"] = torch.from_numpy(sampler.scores)
     tensors["sampler/shares"] = torch.from_numpy(sampler.shares)
+    tensors["sampler/plan_scores"] = torch.from_numpy(sampler.plan_scores)
+    tensors["sampler/plan_shares"] = torch.from_numpy(sampler.plan_shares)
     tensors["random/torch"] = torch.get_rng_state()
     # stable-baselines3 shuffles its minibatches with numpy's global generator.
     _, keys, position, has_gauss, gauss = np.random.get_state()  # noqa: NPY002
@@ -77,7 +79,10 @@ def restore(
     tensors: dict[str, Tensor],
     state: dict[str, Any],
 ) -> None:
-    """Puts ``learner`` and ``sampler`` where the checkpoint left them."""
+    """Puts ``learner`` and ``sampler`` where the checkpoint left them.
+
+    Among other plans than those of the checkpoint, what it knows of each is left out.
+    """
     start_from(learner, tensors, state)
     moments: dict[int, dict[str, Tensor]] = {}
     for key, value in _part(tensors, "optimizer").items():
@@ -88,6 +93,10 @@ def restore(
     optimizer.load_state_dict({"state": moments, "param_groups": groups})
     sampler.scores[:] = tensors["sampler/scores"].numpy()
     sampler.shares[:] = tensors["sampler/shares"].numpy()
+    scores = tensors.get("sampler/plan_scores")
+    if scores is not None and len(scores) == len(sampler.plan_scores):
+        sampler.plan_scores[:] = scores.numpy()
+        sampler.plan_shares[:] = tensors["sampler/plan_shares"].numpy()
     sampler.random.bit_generator.state = state["sampler_random"]
     torch.set_rng_state(tensors["random/torch"])
     position, has_gauss, gauss = state["numpy_random"]

@@ -245,3 +245,29 @@ def test_scores_follow_what_episodes_return(plans):
         sampler.record(0, 0.8, 1.0)
     assert sampler.score_by_label()["dog-trot"] == pytest.approx(80, abs=0.1)
     assert sampler.score_by_label()["dog-pace"] == 0.0
+
+
+def test_within_a_label_the_sampler_prefers_the_plan_that_lacks_most(plans):
+    """Of three trots one returns .9, one .5 and one has not been drawn.
+
+    That counts as its label does, .7: shares of .01, .25 and .09, and the pace, as
+    good as the label of the trots, gets half of all.
+    """
+    trot, pace = plans[0], plans[1]
+    sampler = PlanSampler([trot, trot, trot, pace], 0)
+    sampler.plan_scores[:2] = 0.9, 0.5
+    sampler.plan_shares[:2] = 1.0
+    sampler.scores[TROT] = sampler.scores[PACE] = 0.7
+    counts = np.bincount([sampler.draw() for _ in range(6000)]) / 6000
+    trots = 0.5 * np.array([0.01, 0.25, 0.09]) / 0.35
+    np.testing.assert_allclose(counts, [*trots, 0.5], atol=0.02)
+    assert sampler.score_by_label()["dog-trot"] == pytest.approx(70)
+
+
+def test_a_plan_is_scored_by_its_last_few_episodes(plans):
+    """Its first episode sets the score; the next, of 1, moves it by .4 of the rest."""
+    sampler = PlanSampler(plans, 0)
+    for score, expected in ((0.5, 0.5), (1.0, 0.7), (1.0, 0.82)):
+        sampler.record(0, score, 1.0)
+        assert sampler.plan_scores[0] == pytest.approx(expected)
+    assert np.isnan(sampler.plan_scores[1:]).all()
