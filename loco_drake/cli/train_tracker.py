@@ -59,6 +59,9 @@ class TrainTracker:
     """Single parts of it; a range is two numbers."""
     termination: TerminationConfig = field(default_factory=TerminationConfig)
     """How far from its plan a robot may be before its episode ends."""
+    homing: float = EnvironmentConfig.homing
+    """What a step loses in training for each metre that the base is beside its plan,
+    1/m; no part of the returns that are reported."""
     privileged: bool = True
     """Whether the policy sees where in the world the base is and how fast it moves,
     which a robot outside simulation does not know well."""
@@ -85,6 +88,8 @@ class TrainTracker:
             )
         self.plant.check()
         self.termination.check()
+        if not self.homing >= 0:
+            raise InputError(f"--homing must be at least 0, not {self.homing}.")
         randomization = self.randomization
         if self.randomize:
             randomization = randomization.with_standard()
@@ -93,6 +98,7 @@ class TrainTracker:
             robot=self.robot,
             plant=self.plant,
             termination=self.termination,
+            homing=self.homing,
             randomization=randomization,
         )
         if not self.privileged:

@@ -34,6 +34,7 @@ class TrackingBatch:
         plan: index of the plan that each robot follows, shape (B,).
         start: sample of its plan that each robot started at, shape (B,).
         sample: sample of its plan that each robot is at, shape (B,).
+        penalty: what each robot's last step loses by homing, shape (B,).
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class TrackingBatch:
         self.plan = np.zeros(count, dtype=np.int64)
         self.start = np.zeros(count, dtype=np.int64)
         self.sample = np.zeros(count, dtype=np.int64)
+        self.penalty = np.zeros(count)
         self._last = np.zeros(count, dtype=np.int64)
         self._state = np.zeros((count, 37))
         self._R_WB = np.zeros((count, 3, 3))
@@ -115,6 +117,8 @@ class TrackingBatch:
         wanted, toes = self._wanted[now], self._toes[now]
         self._R_WB = quat_to_matrix(self._state[:, :4])
         terms = reward_terms(self._robot, wanted, toes, self._state, self._R_WB)
+        gap = self._state[:, 4:6] - wanted[:, 4:6]
+        self.penalty = self._config.homing * np.linalg.norm(gap, axis=1)
         lost = is_lost(
             self._robot, self._config.termination, self._state, wanted, self._R_WB
         )

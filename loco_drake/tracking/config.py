@@ -54,6 +54,10 @@ class EnvironmentConfig:
         termination: when an episode ends early.
         episode_steps: an episode is truncated after this many steps.
         reset_noise: how far from the plan's state episodes start.
+        homing: what a step loses in training for each metre that the base is beside
+            the plan's, 1/m. The reward's own term for it is flat beyond half a metre,
+            so that nothing calls a robot back that strayed further. It is no part of
+            returns.
         randomization: in what each episode's world differs from the model.
     """
 
@@ -62,6 +66,7 @@ class EnvironmentConfig:
     termination: TerminationConfig = field(default_factory=TerminationConfig)
     episode_steps: int = 200
     reset_noise: ResetNoise = field(default_factory=ResetNoise)
+    homing: float = 0.0
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
 
     def without_position(self) -> "EnvironmentConfig":

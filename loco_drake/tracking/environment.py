@@ -25,7 +25,8 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
 
     Observations are those of :mod:`loco_drake.systems.observation`, actions those of
     :class:`loco_drake.systems.joint_targets.JointTargets`, rewards the sum of
-    :func:`loco_drake.systems.tracking_reward.reward_terms`, at most 1 a step. An
+    :func:`loco_drake.systems.tracking_reward.reward_terms`, at most 1 a step, less
+    what the configuration's ``homing`` takes, which is nothing by default. An
     episode starts in a state of the plan (reference state initialization, Peng et al.
     2018), terminates when the robot falls or loses its plan, and is truncated when its
     time or its plan is over.
@@ -68,7 +69,7 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
         }
         return (
             self._batch.observe()[0],
-            float(terms.sum()),
+            float(terms.sum() - self._batch.penalty[0]),
             bool(terminated[0]),
             bool(truncated[0]),
             info,

@@ -53,9 +53,19 @@ def _step(
     actions: NDArray[np.float32],
     next_plans: list[int],
     random: list[np.random.Generator],
-) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], list[Any]]:
-    """Steps and, where episodes end, resets, as VecEnv wants it."""
+) -> tuple[
+    NDArray[np.float32],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.bool_],
+    list[Any],
+]:
+    """Steps and, where episodes end, resets, as VecEnv wants it.
+
+    Of the reward it returns what counts for returns, and the penalty.
+    """
     terms, terminated, truncated = batch.step(actions)
+    penalty = batch.penalty
     observations = batch.observe()
     done = terminated | truncated
     infos: list[dict[str, Any]] = [{} for _ in next_plans]
@@ -69,7 +79,7 @@ def _step(
         batch.reset(int(i), random[i], next_plans[i])
     if len(ended):
         observations[ended] = batch.observe(ended)
-    return observations, terms.sum(axis=-1), done, infos
+    return observations, terms.sum(axis=-1), penalty, done, infos
 
 
 class WorkerVecEnv(VecEnv):
@@ -140,9 +150,11 @@ class WorkerVecEnv(VecEnv):
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[Any]]:
         """Returns observations, rewards, dones and infos."""
         parts = zip(*self._receive(), strict=True)
-        observations, rewards, dones = (np.concatenate(next(parts)) for _ in range(3))
+        observations, returns, penalties, dones = (
+            np.concatenate(next(parts)) for _ in range(4)
+        )
         infos = [info for part in next(parts) for info in part]
-        self._returns += rewards
+        self._returns += returns
         self._lengths += 1
         for i in np.flatnonzero(dones):
             info = infos[i]
@@ -163,7 +175,7 @@ class WorkerVecEnv(VecEnv):
             self._next_plans[i] = self._sampler.draw()
             self._returns[i] = 0
             self._lengths[i] = 0
-        return observations, rewards.astype(np.float32), dones, infos
+        return observations, (returns - penalties).astype(np.float32), dones, infos
 
     def close(self) -> None:
         """Ends the workers."""

@@ -164,6 +164,9 @@ WRONG = {
     "train tracker --references FILES/empty --termination.position 0": (
         "position must be above 0, not 0"
     ),
+    "train tracker --references FILES/empty --homing=-1": (
+        "--homing must be at least 0, not -1"
+    ),
 }
 
 

@@ -110,6 +110,24 @@ def test_a_step_is_what_the_diagram_does(plans, contact, time_step, tolerance):
         np.testing.assert_allclose(terms[0], theirs, rtol=0, atol=tolerance)
 
 
+def test_homing_takes_its_share_for_each_metre_beside_the_plan(plans):
+    """Of the reward, not of its terms, from which returns are made."""
+    free, called = (
+        TrackingEnv(plans, EnvironmentConfig(homing=homing)) for homing in (0.0, 0.3)
+    )
+    for env in (free, called):
+        env.reset(seed=0, options={"plan": 0, "sample": 10})
+    for k in range(1, 6):
+        (_, reward, *_, info), (_, less, *_, same) = (
+            free.step(STILL),
+            called.step(STILL),
+        )
+        assert info == same
+        x, y = called._batch._state[0, 4:6] - plans[0].state[10 + k, 4:6]
+        assert reward - less == pytest.approx(0.3 * (x * x + y * y) ** 0.5)
+        assert less < reward
+
+
 def test_time_limits_truncate(plans):
     env = TrackingEnv(plans, EnvironmentConfig(episode_steps=5))
     env.reset(seed=0, options={"plan": 0, "sample": 10})

@@ -202,6 +202,26 @@ def test_a_killed_worker_is_reported(plans):
         workers.close()
 
 
+def test_homing_is_no_part_of_returns(plans):
+    """The same steps are rewarded less, and score the same."""
+    rewards, returns = [], []
+    for homing in (0.0, 1.0):
+        environment = EnvironmentConfig(homing=homing, episode_steps=5)
+        workers = WorkerVecEnv(
+            plans, environment, PlanSampler(plans, 0), workers=1, per_worker=1, seed=0
+        )
+        try:
+            workers.reset()
+            for _ in range(5):
+                _, reward, _, infos = workers.step(np.zeros((1, 12), dtype=np.float32))
+                rewards.append(reward[0])
+            returns.append(infos[0]["episode"]["r"])
+        finally:
+            workers.close()
+    assert returns[0] == returns[1] == pytest.approx(20 * sum(rewards[:5]), rel=1e-5)
+    assert (np.array(rewards[5:]) < np.array(rewards[:5])).all()
+
+
 def test_the_sampler_prefers_what_lacks_most(plans):
     """Trot at .9 lacks .1, pace at .5 lacks .5: 25 draws in 26 are a pace.
 
