@@ -19,6 +19,11 @@ from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
 from loco_drake.tracking.sampler import PlanSampler
 
+# This share of the episodes that fell or lost their plan is followed by another try,
+# from so many samples earlier, so that the moments which are failed are practised most.
+_RETRIED = 0.5
+_LEAD = (25, 125)  # least and most
+
 _DIED = "A worker process died; training goes on from its checkpoint with --resume."
 
 
@@ -73,10 +78,15 @@ def _step(
     for i in ended:
         infos[i] = {
             "plan": int(batch.plan[i]),
+            "retried": bool(terminated[i]) and random[i].random() < _RETRIED,
             "TimeLimit.truncated": bool(truncated[i]),
             "terminal_observation": observations[i].copy(),
         }
-        batch.reset(int(i), random[i], next_plans[i])
+        plan, sample = next_plans[i], None
+        if infos[i]["retried"]:
+            lead = int(random[i].integers(*_LEAD))
+            plan, sample = int(batch.plan[i]), max(0, int(batch.sample[i]) - lead)
+        batch.reset(int(i), random[i], plan, sample)
     if len(ended):
         observations[ended] = batch.observe(ended)
     return observations, terms.sum(axis=-1), penalty, done, infos
@@ -115,6 +125,8 @@ class WorkerVecEnv(VecEnv):
         self._per_worker = per_worker
         # What each environment goes on with when its episode is over.
         self._next_plans = [sampler.draw() for _ in range(self.num_envs)]
+        # Episodes that are another try: too hard to be counted.
+        self._retrying = np.zeros(self.num_envs, dtype=bool)
         self._returns = np.zeros(self.num_envs)
         self._lengths = np.zeros(self.num_envs, dtype=int)
         # Fork would copy the threads' locks of torch and Drake.
@@ -137,6 +149,7 @@ class WorkerVecEnv(VecEnv):
         """Starts a new episode everywhere; returns observations (num_envs, size)."""
         self._send(None)
         self._next_plans = [self._sampler.draw() for _ in self._next_plans]
+        self._retrying[:] = False
         self._returns[:] = 0
         self._lengths[:] = 0
         return np.concatenate(self._receive())
@@ -162,17 +175,20 @@ class WorkerVecEnv(VecEnv):
             steps = (
                 self._lengths[i] if info["TimeLimit.truncated"] else self._episode_steps
             )
-            self._sampler.record(
-                info["plan"],
-                self._returns[i] / steps,
-                self._lengths[i] / self._episode_steps,
-            )
+            if not self._retrying[i]:
+                self._sampler.record(
+                    info["plan"],
+                    self._returns[i] / steps,
+                    self._lengths[i] / self._episode_steps,
+                )
             info["episode"] = {
                 "r": 100 * self._returns[i] / steps,
                 "l": int(self._lengths[i]),
                 "t": 0.0,
             }
-            self._next_plans[i] = self._sampler.draw()
+            self._retrying[i] = info["retried"]
+            if not info["retried"]:
+                self._next_plans[i] = self._sampler.draw()
             self._returns[i] = 0
             self._lengths[i] = 0
         return observations, (returns - penalties).astype(np.float32), dones, infos

@@ -222,6 +222,35 @@ def test_homing_is_no_part_of_returns(plans):
     assert (np.array(rewards[5:]) < np.array(rewards[:5])).all()
 
 
+def test_every_other_lost_episode_is_tried_again_from_before_it(plans):
+    """With joints thrown about robots fall; what is tried again is not scored."""
+    sampler = PlanSampler(plans, 0)
+    scored = []
+    sampler.record = lambda plan, score, share: scored.append(plan)
+    environment = EnvironmentConfig(episode_steps=100)
+    workers = WorkerVecEnv(plans, environment, sampler, workers=1, per_worker=8, seed=0)
+    random = np.random.default_rng(0)
+    retrying, lost, ended, again = [False] * 8, [0] * 8, [], 0
+    try:
+        workers.reset()
+        for _ in range(150):
+            actions = random.uniform(-6, 6, (8, 12)).astype(np.float32)
+            _, _, dones, infos = workers.step(actions)
+            for i in np.flatnonzero(dones):
+                if retrying[i]:
+                    again += 1
+                    assert infos[i]["plan"] == lost[i]
+                else:
+                    ended.append(infos[i]["plan"])
+                assert not (infos[i]["retried"] and infos[i]["TimeLimit.truncated"])
+                retrying[i], lost[i] = infos[i]["retried"], infos[i]["plan"]
+    finally:
+        workers.close()
+    assert scored == ended
+    assert len(ended) > 20
+    assert again / (again + len(ended)) == pytest.approx(0.5, abs=0.15)
+
+
 def test_the_sampler_prefers_what_lacks_most(plans):
     """Trot at .9 lacks .1, pace at .5 lacks .5: 25 draws in 26 are a pace.
 
