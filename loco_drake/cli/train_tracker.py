@@ -62,6 +62,9 @@ class TrainTracker:
     homing: float = EnvironmentConfig.homing
     """What a step loses in training for each metre that the base is beside its plan,
     1/m; no part of the returns that are reported."""
+    fall_cost: float = EnvironmentConfig.fall_cost
+    """What a fall costs in training beyond the steps that it loses, in steps done
+    perfectly; no part of the returns either."""
     privileged: bool = True
     """Whether the policy sees where in the world the base is and how fast it moves,
     which a robot outside simulation does not know well."""
@@ -88,8 +91,12 @@ class TrainTracker:
             )
         self.plant.check()
         self.termination.check()
-        if not self.homing >= 0:
-            raise InputError(f"--homing must be at least 0, not {self.homing}.")
+        for name in ("homing", "fall_cost"):
+            if not getattr(self, name) >= 0:
+                option = "--" + name.replace("_", "-")
+                raise InputError(
+                    f"{option} must be at least 0, not {getattr(self, name)}."
+                )
         randomization = self.randomization
         if self.randomize:
             randomization = randomization.with_standard()
@@ -99,6 +106,7 @@ class TrainTracker:
             plant=self.plant,
             termination=self.termination,
             homing=self.homing,
+            fall_cost=self.fall_cost,
             randomization=randomization,
         )
         if not self.privileged:

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from loco_drake.models.robots import get_robot
 from loco_drake.rotations import quat_to_matrix
 from loco_drake.systems.domain import Domain
+from loco_drake.systems.fall import has_fallen
 from loco_drake.systems.joint_targets import joint_targets
 from loco_drake.systems.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.systems.plan import PLAN_DT, Plan
@@ -34,7 +35,7 @@ class TrackingBatch:
         plan: index of the plan that each robot follows, shape (B,).
         start: sample of its plan that each robot started at, shape (B,).
         sample: sample of its plan that each robot is at, shape (B,).
-        penalty: what each robot's last step loses by homing, shape (B,).
+        penalty: what each robot's last step loses by homing and falls, shape (B,).
     """
 
     def __init__(
@@ -118,7 +119,9 @@ class TrackingBatch:
         self._R_WB = quat_to_matrix(self._state[:, :4])
         terms = reward_terms(self._robot, wanted, toes, self._state, self._R_WB)
         gap = self._state[:, 4:6] - wanted[:, 4:6]
+        fallen = has_fallen(self._robot, self._state[:, :19], self._R_WB)
         self.penalty = self._config.homing * np.linalg.norm(gap, axis=1)
+        self.penalty += self._config.fall_cost * fallen
         lost = is_lost(
             self._robot, self._config.termination, self._state, wanted, self._R_WB
         )

@@ -57,7 +57,9 @@ class EnvironmentConfig:
         homing: what a step loses in training for each metre that the base is beside
             the plan's, 1/m. The reward's own term for it is flat beyond half a metre,
             so that nothing calls a robot back that strayed further. It is no part of
-            returns.
+            returns, and neither is what a fall costs.
+        fall_cost: what a fall costs in training beyond the steps that it loses, of
+            which discounting sees some thirty; a judged episode can lose 500.
         randomization: in what each episode's world differs from the model.
     """
 
@@ -67,6 +69,7 @@ class EnvironmentConfig:
     episode_steps: int = 200
     reset_noise: ResetNoise = field(default_factory=ResetNoise)
     homing: float = 0.0
+    fall_cost: float = 0.0
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
 
     def without_position(self) -> "EnvironmentConfig":

@@ -26,7 +26,7 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
     Observations are those of :mod:`loco_drake.systems.observation`, actions those of
     :class:`loco_drake.systems.joint_targets.JointTargets`, rewards the sum of
     :func:`loco_drake.systems.tracking_reward.reward_terms`, at most 1 a step, less
-    what the configuration's ``homing`` takes, which is nothing by default. An
+    what the configuration's ``homing`` and ``fall_cost`` take, by default nothing. An
     episode starts in a state of the plan (reference state initialization, Peng et al.
     2018), terminates when the robot falls or loses its plan, and is truncated when its
     time or its plan is over.

@@ -167,6 +167,9 @@ WRONG = {
     "train tracker --references FILES/empty --homing=-1": (
         "--homing must be at least 0, not -1"
     ),
+    "train tracker --references FILES/empty --fall-cost=-2": (
+        "--fall-cost must be at least 0, not -2"
+    ),
 }
 
 

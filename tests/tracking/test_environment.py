@@ -13,13 +13,16 @@ from loco_drake.rotations import yaw_of
 from loco_drake.systems.diagram import MakeLocomotionDiagram, PlaceOnPlan
 from loco_drake.systems.plan import PLAN_DT
 from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
+from loco_drake.systems.tracking_reward import REWARD_TERMS
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.config import EnvironmentConfig, ResetNoise
 from loco_drake.tracking.environment import TrackingEnv
 from loco_drake.tracking.references import load_references
 from loco_drake.tracking.registration import make_tracking
+from loco_drake.tracking.terminations import TerminationConfig
 from tests.synthetic_motion import synthetic_motion
 
+ANYWHERE = TerminationConfig(position=1e3, rotation=1e3)  # but fallen
 NO_NOISE = ResetNoise(joints=0, velocities=0, position=0, heading=0)
 STILL = np.zeros(12, dtype=np.float32)
 
@@ -126,6 +129,21 @@ def test_homing_takes_its_share_for_each_metre_beside_the_plan(plans):
         x, y = called._batch._state[0, 4:6] - plans[0].state[10 + k, 4:6]
         assert reward - less == pytest.approx(0.3 * (x * x + y * y) ** 0.5)
         assert less < reward
+
+
+def test_a_fall_costs_what_it_is_to_cost(plans):
+    env = TrackingEnv(plans, EnvironmentConfig(fall_cost=4.0, termination=ANYWHERE))
+    env.reset(seed=0, options={"plan": 0, "sample": 10})
+    terms, reward, terminated = 0.0, 0.0, False
+    thrown = np.full(12, 8.0, dtype=np.float32)
+    for _ in range(100):
+        assert reward == pytest.approx(terms)
+        _, reward, terminated, _, info = env.step(thrown)
+        terms = sum(info[name] for name in REWARD_TERMS)
+        if terminated:
+            break
+    assert terminated
+    assert reward == pytest.approx(terms - 4.0)
 
 
 def test_time_limits_truncate(plans):
