@@ -31,6 +31,7 @@ from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.pretrained import pretrained_motion_model
 from loco_drake.models.plant import AddRobotPlant, ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import get_robot
+from loco_drake.systems.fall import has_fallen
 from loco_drake.systems.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.systems.plan import PLAN_DT, Plan, plan_from_motion
 from loco_drake.systems.retiming import path_limits
@@ -39,7 +40,7 @@ from loco_drake.systems.tracking_reward import reward_terms
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.randomization import STANDARD, RandomizationConfig
-from loco_drake.tracking.terminations import TerminationConfig, is_lost
+from loco_drake.tracking.terminations import TerminationConfig, has_strayed
 
 ROBOT = "go2"
 ROBOTS = 16  # in a worker
@@ -175,7 +176,8 @@ def parts(plan: Plan, calls: int = 100) -> dict[str, float]:
     functions: dict[str, Callable[[], object]] = {
         "observe": lambda: observe(robot, shown, state, action),
         "reward_terms": lambda: reward_terms(robot, wanted, toes, state),
-        "is_lost": lambda: is_lost(robot, termination, state, wanted),
+        "has_fallen": lambda: has_fallen(robot, state[:, :19]),
+        "has_strayed": lambda: has_strayed(termination, state, wanted),
     }
     seconds = {}
     for name, function in functions.items():

@@ -14,7 +14,7 @@ from loco_drake.systems.sensors import draw_error, measure
 from loco_drake.systems.tracking_reward import reward_terms
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.physics import make_worlds
-from loco_drake.tracking.terminations import is_lost
+from loco_drake.tracking.terminations import has_strayed
 
 Array = NDArray[np.float64]
 
@@ -122,9 +122,7 @@ class TrackingBatch:
         fallen = has_fallen(self._robot, self._state[:, :19], self._R_WB)
         self.penalty = self._config.homing * np.linalg.norm(gap, axis=1)
         self.penalty += self._config.fall_cost * fallen
-        lost = is_lost(
-            self._robot, self._config.termination, self._state, wanted, self._R_WB
-        )
+        lost = fallen | has_strayed(self._config.termination, self._state, wanted)
         return terms, lost, ~lost & (self.sample >= self._last)
 
     def observe(

@@ -82,17 +82,14 @@ class PlanSampler:
 
     def score_by_label(self) -> dict[str, float]:
         """Returns the mean over its plans of recent normalized returns, 0 to 100."""
-        scores = _filled(self.plan_scores, 0.0)
-        return {
-            str(LABELS[i]): 100 * float(scores[self._drawn(i)].mean())
-            for i in self.present
+        drawn = ~np.isnan(self.plan_scores)
+        scores = {
+            i: self.plan_scores[drawn & (self._labels == i)] for i in self.present
         }
-
-    def _drawn(self, label: int) -> NDArray[np.bool_]:
-        """Returns which plans of a label have been drawn, all of them if none has."""
-        own = self._labels == label
-        drawn = own & ~np.isnan(self.plan_scores)
-        return drawn if drawn.any() else own
+        return {
+            str(LABELS[i]): 100 * float(own.mean()) if len(own) else 0.0
+            for i, own in scores.items()
+        }
 
 
 def _filled(values: NDArray[np.float64], value: float) -> NDArray[np.float64]:

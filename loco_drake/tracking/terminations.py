@@ -6,8 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.errors import InputError
-from loco_drake.models.robots import Robot
-from loco_drake.systems.fall import has_fallen
 
 
 @dataclass(kw_only=True)
@@ -35,26 +33,21 @@ class TerminationConfig:
                 )
 
 
-def is_lost(
-    robot: Robot,
+def has_strayed(
     config: TerminationConfig,
     state: NDArray[np.float64],
     plan_state: NDArray[np.float64],
-    R_WB: NDArray[np.float64] | None = None,
 ) -> NDArray[np.bool_]:
-    """Returns whether each robot fell or is too far from its plan to come back, (...).
+    """Returns whether each robot is too far from its plan to come back, (...).
 
     Args:
-        robot: the robot.
         config: how far is too far.
         state: the plant's [q, v], shape (..., 37).
         plan_state: the same of the plan.
-        R_WB: the base's rotation matrix (..., 3, 3), if it is known already.
     """
     gap = np.linalg.norm(state[..., 4:7] - plan_state[..., 4:7], axis=-1)
     # A turn by an angle a takes a unit quaternion to one whose product with it is
     # cos(a / 2), up to its sign.
     product = np.einsum("...i,...i->...", state[..., :4], plan_state[..., :4])
     turn = 2 * np.arccos(np.minimum(np.abs(product), 1.0))
-    strayed = (gap > config.position) | (turn > config.rotation)
-    return has_fallen(robot, state[..., :19], R_WB) | strayed
+    return (gap > config.position) | (turn > config.rotation)

@@ -70,7 +70,6 @@ def _step(
     Of the reward it returns what counts for returns, and the penalty.
     """
     terms, terminated, truncated = batch.step(actions)
-    penalty = batch.penalty
     observations = batch.observe()
     done = terminated | truncated
     infos: list[dict[str, Any]] = [{} for _ in next_plans]
@@ -89,7 +88,7 @@ def _step(
         batch.reset(int(i), random[i], plan, sample)
     if len(ended):
         observations[ended] = batch.observe(ended)
-    return observations, terms.sum(axis=-1), penalty, done, infos
+    return observations, terms.sum(axis=-1), batch.penalty, done, infos
 
 
 class WorkerVecEnv(VecEnv):
