@@ -200,7 +200,7 @@ def _AddControl(
     if isinstance(config, ExternalAction):
         builder.ExportInput(targets.GetInputPort("action"), "action")
     else:
-        weights = config.weights or policy_path(robot)
+        weights = policy_path(robot, config.weights)
         policy = builder.AddNamedSystem(
             "policy", TrackingPolicy(load_actor(weights, robot))
         )

@@ -12,12 +12,40 @@ def pretrained_dir() -> Path:
     return Path(str(resources.files("loco_drake.models"))) / "pretrained"
 
 
-def policy_path(robot: Robot) -> Path:
-    """Returns the shipped policy of ``robot``.
+def policy_variants(robot: Robot) -> dict[str, Path]:
+    """Returns by name the shipped policies of ``robot`` other than its main one."""
+    prefix = f"policy_{robot.name}_"
+    files = sorted(pretrained_dir().glob(f"{prefix}*.safetensors"))
+    return {file.stem.removeprefix(prefix): file for file in files}
+
+
+def policy_path(robot: Robot, policy: Path | None = None) -> Path:
+    """Returns the file of a policy's weights.
+
+    Args:
+        robot: that it moves.
+        policy: a file of weights, which is returned as it is, or the bare name of a
+            shipped variant, such as "randomized"; the shipped policy if not given.
 
     Raises:
-        InputError: naming the robots that have one, if this robot has none.
+        InputError: if there is no such policy, naming those that there are.
     """
+    if policy is None:
+        return _main(robot)
+    if policy.name != str(policy) or policy.suffix or policy.exists():
+        return policy
+    variants = policy_variants(robot)
+    if str(policy) not in variants:
+        names = ", ".join(variants)
+        raise InputError(
+            f"There are no policy weights at {str(policy)!r}, and no shipped policy of "
+            f"{robot.name} has that name; "
+            + (f"there are {names}." if names else "there is but the main one.")
+        )
+    return variants[str(policy)]
+
+
+def _main(robot: Robot) -> Path:
     paths = {name: pretrained_dir() / f"policy_{name}.safetensors" for name in ROBOTS}
     shipped = [name for name, path in paths.items() if path.is_file()]
     if robot.name not in shipped:

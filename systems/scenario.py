@@ -46,7 +46,8 @@ class PlanReference:
 class TrainedPolicy:
     """The learned policy."""
 
-    # Weights; the shipped ones of the robot if not given.
+    # Weights, or the name of a shipped variant, such as randomized; the shipped policy
+    # of the robot if not given.
     weights: Path | None = None
 
 

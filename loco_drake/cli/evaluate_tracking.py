@@ -49,7 +49,8 @@ class EvaluateTracking:
     duration: float = 10.0
     """Seconds of each episode; of a recording at most its length."""
     policy: Path | None = None
-    """Weights of the policy. Default: those that come with the package."""
+    """Weights of the policy, or the name of another shipped one, such as randomized.
+    Default: the robot's main one."""
     contact: str = "similar"
     """Contact solver: similar, lagged, sap or cenic."""
     time_step: float = 0.01
@@ -124,7 +125,7 @@ class EvaluateTracking:
     def _plan(self, name: str) -> tuple[Scenario, list[Trial]]:
         """Returns what to simulate for a robot."""
         robot = get_robot(name)
-        weights = self.policy or policy_path(robot)
+        weights = policy_path(robot, self.policy)
         trained = load_actor(weights, robot).config.labels
         labels = [str(parse_label(label)) for label in self.labels or trained]
         plant = PlantConfig(

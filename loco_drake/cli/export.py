@@ -21,7 +21,8 @@ class Export:
     robot: str = "go2"
     """Robot: go2 or a1."""
     policy: Path | None = None
-    """Weights of the policy; default: those that come with the package."""
+    """Weights of the policy, or the name of another shipped one, such as randomized;
+    default: the robot's main one."""
     out: Path = Path("policy.onnx")
     """File to write."""
     json: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
@@ -34,7 +35,7 @@ class Export:
         robot = get_robot(self.robot)
         if self.out.suffix != ".onnx":
             raise InputError(f"--out must end in .onnx, not {str(self.out)!r}.")
-        actor = load_actor(self.policy or policy_path(robot), robot)
+        actor = load_actor(policy_path(robot, self.policy), robot)
         metadata = export_onnx(actor, robot, self.out)
         write_json(self.json, metadata)
         shown = [(name, metadata[name]) for name in ("robot", "labels", "rate")]

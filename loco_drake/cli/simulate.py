@@ -47,7 +47,8 @@ class Simulate:
     reference: str = "gpt"
     """gpt: written by the generator while the simulation runs; or a Motion file."""
     policy: Path | None = None
-    """Weights of the policy; default: those that come with the package."""
+    """Weights of the policy, or the name of another shipped one, such as randomized;
+    default: the robot's main one."""
     meshcat: bool = True
     """Show the simulation live in the browser, in real time at best."""
     port: int | None = None

@@ -103,6 +103,7 @@ WRONG = {
     "export --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
     "export --out policy.txt": "--out must end in .onnx, not 'policy.txt'",
     "export --policy FILES/none.safetensors": "There are no policy weights at",
+    "export --robot go2 --policy robust": "no shipped policy of go2 has that name",
     "export --policy FILES/policy_of_a1.safetensors": "another robot: a1, not go2",
     "generate --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
     "generate --gait fly": f"Unknown gait 'fly'; the choices are {GAITS}",

@@ -54,6 +54,7 @@ def made(tmp_path_factory):
         tokenizer={"robots": {"go2": tokenizer()}},
         tracking_go2_generated=tracking(),
         tracking_go2_lagged=tracking(normalized_return=55.5, stretch=1.0),
+        tracking_go2_randomized=tracking(normalized_return=44.4, fall_rate=0.25),
         learning_go2=learning(),
     )
     return make(folder, "--results", results, "--replays", "none")
@@ -93,6 +94,13 @@ def test_figures_by_gait_are_in_their_sections_and_units(made):
     lagged = row(section(page, "robustness"), "Go2, lagged")
     assert lagged[1:3] == ["55.5", "1.000"]
     assert lagged[7] == "60.0 dog-trot"
+
+
+def test_a_policy_is_shown_in_both_worlds_side_by_side(made):
+    page, _ = made
+    cells = row(section(page, "robustness"), "Go2, as shipped")
+    assert cells[1:4] == ["77.0", "1.021", "2"]
+    assert cells[7:10] == ["44.4", "1.021", "25"]
 
 
 def test_pictures_say_what_they_show(made):

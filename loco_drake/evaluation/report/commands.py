@@ -11,7 +11,6 @@ _OPTIONS = (
     ("friction", "--friction", 0.8),
     ("duration_s", "--duration", 10.0),
 )
-_FLAGS = {"tracking-randomized": "--randomize", "tracking-pushes": "--pushes"}
 
 
 def commands(results: Results) -> dict[str, str]:
@@ -36,8 +35,8 @@ def _command(file: ResultFile, results: Results) -> str:
         value = figures.values.get(key) if text else figures.number(key)
         if value not in (None, default):
             options.append(f"{option} {value if text else f'{value:g}'}")
-    if file.name in _FLAGS:
-        options.append(_FLAGS[file.name])
+    if file.flags:
+        options.append(file.flags)
     seeds = _most_episodes(figures)
     if seeds:
         options.append(f"--seeds {seeds:.0f}")

@@ -13,12 +13,14 @@ class ResultFile:
         name: without robot and suffix.
         robots: whose figures it is to hold; its own, or all of them.
         command: writes it, but for ``--json``.
+        flags: the part of ``command`` that figures of tracking do not tell.
         holds: a key that all figures of a robot have; null where there are none.
     """
 
     name: str
     robots: tuple[str, ...]
     command: str
+    flags: str = ""
     holds: str = "labels"
 
     @property
@@ -64,18 +66,50 @@ CONDITIONS = {
     ),
 }
 
+# Shipped policies, as evaluate tracking calls them: what they are.
+POLICIES = {
+    "": "as shipped",
+    "randomized": "trained in randomized worlds",
+    "unprivileged": "… and without privileged observations",
+}
+_HAVE_VARIANTS = ("a1",)
+# Where they are compared: title, its name as a condition, options.
+WORLDS = (
+    ("world of the training", "generated", "--seeds 20"),
+    ("randomized worlds", "randomized", "--randomize --seeds 5"),
+)
+
+
+def tracking_name(condition: str, policy: str = "") -> str:
+    """Returns the name of the results of a shipped policy under a condition."""
+    return "-".join(
+        filter(None, ("tracking", policy and f"{policy}_policy", condition))
+    )
+
+
+def _tracking(robot: str, condition: str, options: str, policy: str = "") -> ResultFile:
+    flags = [o for o in options.split() if o in ("--randomize", "--pushes")]
+    if policy:
+        flags.insert(0, f"--policy {policy}")
+        options = f"--policy {policy} {options}"
+    return ResultFile(
+        tracking_name(condition, policy),
+        (robot,),
+        f"loco-drake evaluate tracking --robot {robot} {options}",
+        " ".join(flags),
+    )
+
+
 EXPECTED = (
     ResultFile("retargeting", ROBOTS, "loco-drake evaluate retargeting --robot all"),
     ResultFile("tokenizer", ROBOTS, "loco-drake evaluate tokenizer --robot all"),
     ResultFile("generation", ROBOTS, "loco-drake evaluate generation --robot all"),
+    *(_tracking(r, name, what[2]) for r in ROBOTS for name, what in CONDITIONS.items()),
     *(
-        ResultFile(
-            f"tracking-{condition}",
-            (robot,),
-            f"loco-drake evaluate tracking --robot {robot} {options}",
-        )
-        for robot in ROBOTS
-        for condition, (_, _, options) in CONDITIONS.items()
+        _tracking(robot, condition, options, policy)
+        for robot in _HAVE_VARIANTS
+        for policy in filter(None, POLICIES)
+        for _, condition, options in WORLDS
     ),
     *(
         ResultFile(

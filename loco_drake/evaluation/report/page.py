@@ -77,6 +77,7 @@ def tables(results: Results) -> dict[str, Any]:
     """
     generation = sections.of_robots(results, "generation")
     robustness = sections.robustness_table(results)
+    policies = sections.policies_table(results)
     return {
         "retargeting": sections.retargeting_tables(results),
         "tokenizer": sections.tokenizer_tables(results),
@@ -87,6 +88,7 @@ def tables(results: Results) -> dict[str, Any]:
         "realism": sections.realism_table(results) if generation else None,
         "tracking": sections.tracking_tables(results),
         "robustness": robustness if robustness.rows else None,
+        "policies": policies if policies.rows else None,
     }
 
 

@@ -2,7 +2,12 @@
 
 from collections.abc import Iterable
 
-from loco_drake.evaluation.report.expected import CONDITIONS
+from loco_drake.evaluation.report.expected import (
+    CONDITIONS,
+    POLICIES,
+    WORLDS,
+    tracking_name,
+)
 from loco_drake.evaluation.report.measures import read_estimate
 from loco_drake.evaluation.report.published import CLIPS
 from loco_drake.evaluation.report.results import Figures, Results
@@ -213,6 +218,38 @@ def robustness_table(results: Results) -> Table:
         ((title, _whole(figures)) for title, figures in rows),
         extra=(("worst gait", _worst), ("measured on", conditions)),
     )
+
+
+def policies_table(results: Results) -> Table:
+    """Returns each shipped policy in the world of the training and in randomized ones.
+
+    So it says what randomization in training costs and brings, and what a policy loses
+    that does without privileged observations.
+    """
+    rows = []
+    for robot in ROBOTS:
+        for policy, title in POLICIES.items():
+            found = [
+                results.of(tracking_name(condition, policy), robot)
+                for _, condition, _ in WORLDS
+            ]
+            if any(found):
+                cells = (cell for figures in found for cell in _world_cells(figures))
+                rows.append(Row(f"{robot_title(robot)}, {title}", tuple(cells)))
+    return Table(
+        "Policies in both worlds",
+        "policy",
+        tuple(column.title for column in _TRACKING) * len(WORLDS),
+        tuple(rows),
+        groups=tuple(title for title, _, _ in WORLDS),
+    )
+
+
+def _world_cells(figures: Figures | None) -> tuple[Cell, ...]:
+    if figures is None:
+        return (Cell(NOTHING),) * len(_TRACKING)
+    whole = figures.part("all")
+    return tuple(column.cell(whole) for column in _TRACKING)
 
 
 def _whole(figures: Figures) -> Figures:

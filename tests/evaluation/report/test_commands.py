@@ -1,5 +1,7 @@
 """The page's commands have the options that a result was made with."""
 
+import json
+
 from loco_drake.evaluation.report.commands import commands
 from loco_drake.evaluation.report.results import load_results
 from tests.report_results import tokenizer, tracking, write_results
@@ -34,4 +36,15 @@ def test_what_is_missing_has_the_usual_command(tmp_path):
     found = commands(load_results(tmp_path))
     assert found["tracking-go2-cenic.json"].endswith(
         "--contact cenic --seeds 2 --duration 4"
+    )
+
+
+def test_other_policies_and_worlds_are_in_the_command(tmp_path):
+    name = "tracking-a1-unprivileged_policy-randomized.json"
+    write_results(tmp_path, tokenizer={"robot": "go2", **tokenizer()})
+    text = json.dumps(tracking("a1", episodes=3))
+    (tmp_path / name).write_text(text)
+    assert commands(load_results(tmp_path))[name] == (
+        "loco-drake evaluate tracking --robot a1 "
+        "--policy unprivileged --randomize --seeds 3"
     )
