@@ -50,6 +50,8 @@ class TrainTracker:
     """Environments in each process."""
     batch: int = PpoConfig.batch
     """Environment steps between updates; what is saved lags no more behind."""
+    minibatch: int = PpoConfig.minibatch
+    """Environment steps in a gradient step, of those of a batch."""
     plant: PlantConfig = field(default_factory=PlantConfig)
     """Contact solver, time step and friction."""
     randomize: bool = False
@@ -80,7 +82,7 @@ class TrainTracker:
     def run(self) -> int:
         """Trains, prints and writes; returns the exit status."""
         robot = get_robot(self.robot)
-        for name in ("steps", "workers", "per_worker"):
+        for name in ("steps", "workers", "per_worker", "minibatch"):
             if getattr(self, name) < 1:
                 raise InputError(f"{name} must be at least 1.")
         environments = self.workers * self.per_worker
@@ -120,7 +122,7 @@ class TrainTracker:
             environment=environment,
             ppo=PpoConfig(
                 batch=self.batch,
-                minibatch=min(self.batch, PpoConfig.minibatch),
+                minibatch=min(self.batch, self.minibatch),
                 privileged=self.privileged,
             ),
         )
