@@ -81,6 +81,8 @@ class EnvironmentConfig:
         """
         return replace(
             self,
-            termination=replace(self.termination, position=1.0),
+            termination=replace(
+                self.termination, position=max(self.termination.position, 1.0)
+            ),
             reset_noise=replace(self.reset_noise, position=0.0),
         )

@@ -26,6 +26,7 @@ from loco_drake.tracking.randomization import (
     WHITE,
     RandomizationConfig,
 )
+from loco_drake.tracking.terminations import TerminationConfig
 
 NO_NOISE = ResetNoise(joints=0, velocities=0, position=0, heading=0)
 PARTS = [part.name for part in fields(STANDARD) if part.name != "push_interval"]
@@ -214,3 +215,9 @@ def test_without_position_only_position_is_forgiven():
     assert config.reset_noise.position == 0.0
     assert config.reset_noise.heading == ResetNoise().heading
     assert config.randomization == STANDARD
+
+
+def test_without_position_a_wider_tube_stays():
+    tube = TerminationConfig(position=1.5)
+    config = EnvironmentConfig(termination=tube).without_position()
+    assert config.termination.position == 1.5
