@@ -1,11 +1,13 @@
 """What the documentation says is so."""
 
+import json
 import re
 from pathlib import Path
 
 import pytest
 
 from loco_drake.cli.main import _COMMANDS
+from loco_drake.evaluation.report.results import results_dir
 from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
 
@@ -54,3 +56,35 @@ def test_retargeting_shows_the_robot_file_as_it_is():
 
 def readme():
     return (ROOT / "README.md").read_text()
+
+
+# Columns of the tables of docs/tracking.md: key of the figure, factor, digits.
+TRACKING_COLUMNS = (
+    ("normalized_return", 1, 1),
+    ("normalized_return_worst", 1, 1),
+    ("fall_rate", 100, 0),
+    ("joint_rmse_rad", 1, 3),
+    ("base_position_rmse_m", 1, 3),
+    ("base_orientation_rmse_rad", 1, 3),
+    ("stance_slip_median_mps", 1, 3),
+    ("stretch", 1, 3),
+    ("speed_mps", 1, 2),
+    ("cost_of_transport", 1, 2),
+)
+
+
+@pytest.mark.parametrize(("robot", "title"), [("a1", "A1:"), ("go2", "Go2:")])
+def test_tracking_shows_the_committed_results(robot, title):
+    page = (ROOT / "docs" / "tracking.md").read_text()
+    (table,) = re.findall(rf"{title}\n\n((?:\|.*\n)+)", page)
+    rows = [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
+    results = json.loads(
+        (results_dir() / f"tracking-{robot}-generated.json").read_text()
+    )
+    figures = {**results["labels"], "all": results["all"]}
+    assert [row[0] for row in rows] == list(figures)
+    for name, *shown in rows:
+        assert shown == [
+            f"{factor * figures[name][key]:.{digits}f}"
+            for key, factor, digits in TRACKING_COLUMNS
+        ], name
