@@ -47,12 +47,12 @@ CONDITIONS = {
     "cenic": (
         "CENIC",
         "Drake's integrator with error control, at accuracy 1e-4",
-        "--contact cenic --seeds 2 --duration 4",
+        "--contact cenic --seeds 5",
     ),
     "lagged": (
         "lagged, 1 ms",
         "another contact solver, at a tenth of the step",
-        "--contact lagged --time-step 0.001 --seeds 2 --duration 4",
+        "--contact lagged --time-step 0.001 --seeds 5",
     ),
     "randomized": (
         "randomized worlds",

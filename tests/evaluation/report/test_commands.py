@@ -34,9 +34,7 @@ def test_options_follow_the_conditions(tmp_path):
 def test_what_is_missing_has_the_usual_command(tmp_path):
     write_results(tmp_path, tokenizer={"robot": "go2", **tokenizer()})
     found = commands(load_results(tmp_path))
-    assert found["tracking-go2-cenic.json"].endswith(
-        "--contact cenic --seeds 2 --duration 4"
-    )
+    assert found["tracking-go2-cenic.json"].endswith("--contact cenic --seeds 5")
 
 
 def test_other_policies_and_worlds_are_in_the_command(tmp_path):
