@@ -19,6 +19,10 @@ from .feed_forward import feed_forward_torques
 Array = NDArray[np.float64]
 
 PLAN_DT = 1.0 / FPS
+# s between a producer's looks at whether more plan is needed. A power of two times
+# PLAN_DT: these events then come at the very times of the control periods. With .1 s
+# they would be 6e-17 s apart at .3 s, and CENIC explodes over a step that short.
+LOOK_PERIOD = 4 * PLAN_DT
 _ARRAYS = ("q", "v", "set_points", "p_WF", "contacts", "labels", "path_time")
 
 

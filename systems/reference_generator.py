@@ -21,10 +21,9 @@ from loco_drake.generation.motion_model import MotionModel, Stream
 from loco_drake.generation.pretrained import pretrained_motion_model
 from loco_drake.models.robots import Robot
 
-from .plan import PLAN_DT, Plan, join_plans, make_plan
+from .plan import LOOK_PERIOD, PLAN_DT, Plan, join_plans, make_plan
 from .scenario import GeneratedReference
 
-_PERIOD = 0.1  # seconds between looks at whether more is needed
 _KEEP = 1.0  # seconds of plan kept behind what has been used up
 
 
@@ -95,7 +94,7 @@ class ReferenceGenerator(LeafSystem):
             prerequisites_of_calc={self.abstract_state_ticket(self._script)},
         )
         self.DeclarePeriodicUnrestrictedUpdateEvent(
-            period_sec=_PERIOD, offset_sec=0.0, update=self._update
+            period_sec=LOOK_PERIOD, offset_sec=0.0, update=self._update
         )
 
     def SetReference(self, context: Context, *, gait: str, seed: int) -> None:

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from loco_drake.models.robots import Robot
 from loco_drake.rotations import quat_continuous
 
-from .plan import PLAN_DT, Plan, join_plans, make_plan, standing_plan
+from .plan import LOOK_PERIOD, PLAN_DT, Plan, join_plans, make_plan, standing_plan
 from .retiming import Clock, PathLimits, path_limits, retime
 
 Array = NDArray[np.float64]
@@ -26,12 +26,10 @@ class SmootherConfig:
         chunk: seconds of plan that are committed at a time; as much again is solved
             for, so that the motion can always go on from what is committed.
         lookahead: seconds of smoothed plan kept ahead of the clock.
-        period: seconds between looks at whether more is needed.
     """
 
     chunk: float = 0.96
     lookahead: float = 1.0
-    period: float = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +90,7 @@ class ToppraSmoother(LeafSystem):
         )
         self.DeclareInitializationUnrestrictedUpdateEvent(self._initialize)
         self.DeclarePeriodicUnrestrictedUpdateEvent(
-            period_sec=self._config.period, offset_sec=0.0, update=self._update
+            period_sec=LOOK_PERIOD, offset_sec=0.0, update=self._update
         )
 
     def _calc_plan(self, context: Context, output: AbstractValue) -> None:
@@ -129,7 +127,7 @@ class ToppraSmoother(LeafSystem):
 
     def _extended(self, progress: _Progress, raw: Plan, now: float) -> _Progress:
         """Returns ``progress`` with as many chunks added as are due and possible."""
-        due = now + self._config.lookahead + self._config.period
+        due = now + self._config.lookahead + LOOK_PERIOD
         if not progress.started:
             progress = _Progress(standing_plan(self._robot, now))
         while not progress.started or progress.plan.end_time < due:

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,9 +9,9 @@ from pydrake.systems.analysis import Simulator
 from loco_drake.errors import InputError
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import save_motion
-from loco_drake.systems.actor import Actor, ActorConfig, save_actor
+from loco_drake.systems.actor import Actor, ActorConfig, load_actor, save_actor
 from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
-from loco_drake.systems.pretrained import policy_path
+from loco_drake.systems.pretrained import policy_path, policy_variants, pretrained_dir
 from loco_drake.systems.scenario import (
     ExternalAction,
     ExternalTargets,
@@ -156,6 +157,25 @@ def test_a_robot_without_weights_says_which_have_some():
     robot = replace(get_robot("a1"), name="spot")
     with pytest.raises(InputError, match=r"weights for spot.*for go2, a1"):
         policy_path(robot)
+
+
+def test_a_policy_is_a_file_or_the_name_of_a_shipped_one(tmp_path, monkeypatch):
+    robot = get_robot("a1")
+    assert policy_path(robot) == pretrained_dir() / "policy_a1.safetensors"
+    there = tmp_path / "mine.safetensors"
+    assert policy_path(robot, there) == there
+    variants = policy_variants(robot)
+    assert {"randomized", "unprivileged"} <= set(variants)
+    for name, path in variants.items():
+        assert policy_path(robot, Path(name)) == path
+        sees = load_actor(path, robot).config.privileged
+        assert sees == (name != "unprivileged")
+    with pytest.raises(InputError, match=r"'robust'.*there are randomized, unpriv"):
+        policy_path(robot, Path("robust"))
+    # A file of that name, without a suffix, comes first.
+    monkeypatch.chdir(tmp_path)
+    Path("randomized").touch()
+    assert policy_path(robot, Path("randomized")) == Path("randomized")
 
 
 def test_a_scenario_is_read_from_yaml(tmp_path):
