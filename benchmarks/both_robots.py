@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from torch import Tensor
 
+from loco_drake.control.observation import OBSERVATION_SIZE
+from loco_drake.control.symmetry import mirror_observations
 from loco_drake.models.robots import ROBOTS
-from loco_drake.systems.observation import OBSERVATION_SIZE
-from loco_drake.systems.symmetry import mirror_observations
 from loco_drake.tracking.environment import ACTION_SPACE
 
 SIZE = OBSERVATION_SIZE + len(ROBOTS)

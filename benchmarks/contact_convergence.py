@@ -22,11 +22,11 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from loco_drake.keypoints import LEGS
+from loco_drake.common.rotations import yaw_of
+from loco_drake.models.legs import LEGS
 from loco_drake.models.plant import AddRobotPlant, ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import ROBOTS, get_robot
 from loco_drake.models.trot import AddTrotSource
-from loco_drake.rotations import yaw_of
 
 DURATION = 4.0  # s
 STEPS = (1e-3, 2e-3, 5e-3, 1e-2)  # s

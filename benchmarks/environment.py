@@ -25,20 +25,20 @@ from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from loco_drake.files import atomic_path
-from loco_drake.gaits import parse_label
+from loco_drake.common.files import atomic_path
+from loco_drake.control.fall import has_fallen
+from loco_drake.control.observation import LOOK_AHEAD, Preview, observe
+from loco_drake.control.plan import PLAN_DT, Plan, plan_from_motion
+from loco_drake.control.retiming import path_limits
+from loco_drake.control.reward import reward_terms
 from loco_drake.generation.generate import generate_motions
-from loco_drake.generation.pretrained import pretrained_motion_model
+from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.plant import AddRobotPlant, ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import get_robot
-from loco_drake.systems.fall import has_fallen
-from loco_drake.systems.observation import LOOK_AHEAD, Preview, observe
-from loco_drake.systems.plan import PLAN_DT, Plan, plan_from_motion
-from loco_drake.systems.retiming import path_limits
+from loco_drake.motion.gaits import parse_label
 from loco_drake.systems.toppra_smoother import smooth_plan
-from loco_drake.systems.tracking_reward import reward_terms
 from loco_drake.tracking.batch import TrackingBatch
-from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.environment_config import EnvironmentConfig
 from loco_drake.tracking.randomization import STANDARD, RandomizationConfig
 from loco_drake.tracking.terminations import TerminationConfig, has_strayed
 

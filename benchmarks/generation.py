@@ -19,11 +19,11 @@ import tyro
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem
 
-from loco_drake.gaits import LABELS, parse_label
+from loco_drake.control.plan import plan_from_motion
 from loco_drake.generation.generate import generate_motion, generate_motions
-from loco_drake.generation.pretrained import pretrained_motion_model
+from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import get_robot
-from loco_drake.systems.plan import plan_from_motion
+from loco_drake.motion.gaits import LABELS, parse_label
 from loco_drake.systems.plan_player import PlanPlayer
 from loco_drake.systems.reference_generator import ReferenceGenerator
 from loco_drake.systems.scenario import GeneratedReference

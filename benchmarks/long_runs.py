@@ -14,9 +14,9 @@ import tyro
 from loco_drake.evaluation.drift import RESOLUTION, SECONDS, beyond_recorded, drift
 from loco_drake.evaluation.recorded import load_recorded
 from loco_drake.evaluation.samples import FRAMES
-from loco_drake.gaits import LABELS
 from loco_drake.generation.generate import generate_motions
-from loco_drake.generation.pretrained import pretrained_motion_model
+from loco_drake.generation.motion_model import pretrained_motion_model
+from loco_drake.motion.gaits import LABELS
 
 
 def main(

@@ -28,11 +28,11 @@ from both_robots import SideBySide, mirror, widen, with_robot
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 
-from loco_drake.errors import InputError
-from loco_drake.files import atomic_path
-from loco_drake.gaits import LABELS
+from loco_drake.common.errors import InputError
+from loco_drake.common.files import atomic_path
+from loco_drake.control.plan import Plan
 from loco_drake.models.robots import ROBOTS, get_robot
-from loco_drake.systems.plan import Plan
+from loco_drake.motion.gaits import LABELS
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.checkpoint import (
     load_checkpoint,
@@ -40,7 +40,7 @@ from loco_drake.tracking.checkpoint import (
     save_checkpoint,
     start_from,
 )
-from loco_drake.tracking.config import EnvironmentConfig, ResetNoise
+from loco_drake.tracking.environment_config import EnvironmentConfig, ResetNoise
 from loco_drake.tracking.learning_curve import PROGRESS
 from loco_drake.tracking.ppo import AdaptivePPO, PpoConfig, make_ppo
 from loco_drake.tracking.references import load_references

@@ -24,14 +24,13 @@ from torch import Tensor
 from torch.nn import functional
 from vector_quantize_pytorch import GroupedResidualVQ
 
+from loco_drake.common.files import atomic_path
 from loco_drake.evaluation.motion_scores import joint_jerk
 from loco_drake.evaluation.recorded import Recorded, load_recorded
 from loco_drake.evaluation.tokenizer import evaluate_tokenizer
 from loco_drake.evaluation.transfer import pair_up, transfer_rmse
-from loco_drake.files import atomic_path
 from loco_drake.generation.features import CONTACTS, JOINTS
 from loco_drake.generation.layers import CausalConv, ConvBlock
-from loco_drake.generation.library import load_library, motion_clip
 from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig
 from loco_drake.generation.tokenizer_score import clip_tensor
@@ -42,8 +41,9 @@ from loco_drake.generation.train_tokenizer import (
     train_tokenizer,
 )
 from loco_drake.generation.training import CHECKPOINT, LoopSettings
+from loco_drake.generation.training_motions import load_library, motion_clip
 from loco_drake.models.robots import get_robot
-from loco_drake.motion import FPS, Motion
+from loco_drake.motion.motion import FPS, Motion
 
 
 class ProductTokenizer(LearningTokenizer):

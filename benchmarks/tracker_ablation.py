@@ -31,18 +31,18 @@ from stable_baselines3.common.distributions import Distribution
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from torch import Tensor
 
-from loco_drake.errors import InputError
-from loco_drake.files import atomic_path
-from loco_drake.gaits import LABELS
+from loco_drake.common.errors import InputError
+from loco_drake.common.files import atomic_path
+from loco_drake.control.actor import OBSERVATION_CLIP, Actor, ActorConfig, load_actor
+from loco_drake.control.observation import LOOK_AHEAD, OBSERVATION_LAYOUT
+from loco_drake.control.plan import Plan
 from loco_drake.models.robots import Robot, get_robot
-from loco_drake.motion import load_motion
-from loco_drake.systems.actor import OBSERVATION_CLIP, Actor, ActorConfig, load_actor
-from loco_drake.systems.observation import LOOK_AHEAD, OBSERVATION_LAYOUT
-from loco_drake.systems.plan import Plan
+from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.motion import load_motion
 from loco_drake.tracking import workers
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.checkpoint import load_checkpoint
-from loco_drake.tracking.config import EnvironmentConfig, ResetNoise
+from loco_drake.tracking.environment_config import EnvironmentConfig, ResetNoise
 from loco_drake.tracking.ppo import AdaptivePPO, PpoConfig
 from loco_drake.tracking.references import smooth_motions
 from loco_drake.tracking.symmetric_policy import SymmetricPolicy

@@ -23,9 +23,9 @@ import numpy as np
 import torch
 from environment import ROBOT, ROBOTS, make_plans
 
-from loco_drake.files import atomic_path
-from loco_drake.systems.plan import Plan
-from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.common.files import atomic_path
+from loco_drake.control.plan import Plan
+from loco_drake.tracking.environment_config import EnvironmentConfig
 from loco_drake.tracking.ppo import PpoConfig
 from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.train import Progress, TrainingConfig, train_tracker

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import tyro
 
+from loco_drake.common.files import atomic_path
 from loco_drake.evaluation.generation_pictures import code_use_figure
 from loco_drake.evaluation.recorded import load_recorded
 from loco_drake.evaluation.tokenizer import evaluate_tokenizer
-from loco_drake.files import atomic_path
-from loco_drake.generation.pretrained import pretrained_path
 from loco_drake.generation.tokenizer import load_tokenizer
+from loco_drake.models.shipped import pretrained_path
 
 
 def main(png: tyro.conf.Positional[Path], motions: Path = Path("motions/go2")) -> None:

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import tyro
 
+from loco_drake.common.files import atomic_path
 from loco_drake.evaluation.gait_change import change_figure
-from loco_drake.files import atomic_path
-from loco_drake.gait_schedule import parse_schedule
 from loco_drake.generation.generate import generate_motions
-from loco_drake.generation.pretrained import pretrained_motion_model
+from loco_drake.generation.motion_model import pretrained_motion_model
+from loco_drake.motion.gait_schedule import parse_schedule
 
 
 def main(

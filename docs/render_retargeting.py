@@ -17,12 +17,12 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 from render_picture import take_picture
 
+from loco_drake.common.files import atomic_path
 from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments, select_labels
-from loco_drake.files import atomic_path
 from loco_drake.models.ground import AddGround
 from loco_drake.models.robots import ROBOTS, AddRobotModel, get_robot
-from loco_drake.motion import FPS, Motion
+from loco_drake.motion.motion import FPS, Motion
 from loco_drake.retargeting.retarget import retarget_clip
 from loco_drake.retargeting.scaling import resample
 from loco_drake.systems.keypoint_visualizer import COLORS, NAMES

@@ -11,7 +11,7 @@ import tyro
 from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import Simulator
 
-from loco_drake.gaits import LABELS, parse_label
+from loco_drake.motion.gaits import LABELS, parse_label
 from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
 from loco_drake.systems.scenario import LoadScenario
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from pydrake.visualization import ModelVisualizer
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 
 from .robots import ROBOTS, ConfigureParser, get_robot
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.rotations import quat_multiply, quat_rotate
+from loco_drake.common.rotations import quat_multiply, quat_rotate
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from pydrake.multibody.parsing import PackageMap
 
-from loco_drake.errors import InputError
-from loco_drake.files import atomic_path, cache_dir
+from loco_drake.common.errors import InputError
+from loco_drake.common.files import atomic_path, cache_dir
 
 # Bumped when the converter changes, so that caches of older versions are redone.
 _VERSION = 1

@@ -14,7 +14,7 @@ from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder
 
-from loco_drake.errors import InputError, check_choice
+from loco_drake.common.errors import InputError, check_choice
 
 from .ground import AddGround
 from .robots import AddRobotModel, Robot

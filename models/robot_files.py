@@ -22,11 +22,11 @@ from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RevoluteJoint
 
-from loco_drake.errors import InputError, check_choice
-from loco_drake.keypoints import LEGS
+from loco_drake.common.errors import InputError, check_choice
 
 from .chain_robot import ChainRobot
 from .chains import LegChains
+from .legs import LEGS
 from .meshes import vendor_folder
 from .quadruped import Quadruped
 from .robots import ROBOTS, get_robot

@@ -14,10 +14,10 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import DiagramBuilder
 
-from loco_drake.errors import check_choice
-from loco_drake.keypoints import LEGS
+from loco_drake.common.errors import check_choice
 
 from . import kinematics
+from .legs import LEGS
 from .meshes import AddMeshPackage
 from .quadruped import Quadruped
 

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus
 
+from loco_drake.control.domain import Domain
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import Robot
 
-from .domain import Domain, DomainSystem
+from .domain import DomainSystem
 
 Array = NDArray[np.float64]
 

@@ -12,19 +12,19 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
+from loco_drake.control.actor import load_actor
+from loco_drake.control.plan import Plan, plan_from_motion
 from loco_drake.models.plant import AddRobotPlant
 from loco_drake.models.robots import Robot, get_robot
-from loco_drake.motion import load_motion
+from loco_drake.models.shipped import policy_path
+from loco_drake.motion.motion import load_motion
 
-from .actor import load_actor
 from .actuation import Actuation
 from .joint_targets import JointTargets
 from .keypoint_visualizer import KeypointVisualizer
 from .observation import Observation
-from .plan import Plan, plan_from_motion
 from .plan_player import PlanPlayer
 from .plan_state import PlanState
-from .pretrained import policy_path
 from .pushes import Pushes
 from .scenario import (
     ExternalAction,

@@ -6,10 +6,9 @@ from pydrake.geometry import Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
+from loco_drake.common.rotations import quat_rotate
+from loco_drake.control.plan import standing_plan
 from loco_drake.models.robots import Robot
-from loco_drake.rotations import quat_rotate
-
-from .plan import standing_plan
 
 # Those of the paper's Figure 1.
 _FRONT = Rgba(0.1, 0.3, 0.9)

@@ -3,9 +3,8 @@
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import AbstractParameterIndex, Context, LeafSystem
 
+from loco_drake.control.plan import Plan, standing_plan
 from loco_drake.models.robots import Robot
-
-from .plan import Plan, standing_plan
 
 
 class PlanPlayer(LeafSystem):

@@ -5,9 +5,8 @@ from typing import Any
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, LeafSystem
 
+from loco_drake.control.plan import standing_plan
 from loco_drake.models.robots import Robot
-
-from .plan import standing_plan
 
 
 class PlanState(LeafSystem):

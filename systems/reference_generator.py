@@ -13,15 +13,18 @@ from pydrake.systems.framework import (
     State,
 )
 
-from loco_drake.errors import InputError
-from loco_drake.gait_schedule import GaitSchedule, parse_schedule
-from loco_drake.gaits import LABELS
+from loco_drake.common.errors import InputError
+from loco_drake.control.plan import LOOK_PERIOD, PLAN_DT, Plan, join_plans, make_plan
 from loco_drake.generation.generate import check_sampling, chunk_labels
-from loco_drake.generation.motion_model import MotionModel, Stream
-from loco_drake.generation.pretrained import pretrained_motion_model
+from loco_drake.generation.motion_model import (
+    MotionModel,
+    Stream,
+    pretrained_motion_model,
+)
 from loco_drake.models.robots import Robot
+from loco_drake.motion.gait_schedule import GaitSchedule, parse_schedule
+from loco_drake.motion.gaits import LABELS
 
-from .plan import LOOK_PERIOD, PLAN_DT, Plan, join_plans, make_plan
 from .scenario import GeneratedReference
 
 _KEEP = 1.0  # seconds of plan kept behind what has been used up
@@ -54,10 +57,10 @@ class ReferenceGenerator(LeafSystem):
     ``path_time`` (s) is how much of the plan has been used up: what the smoother has
     committed; if it is not connected, the context's time. The configured gait may be a
     schedule, whose times are on the plan's clock and are kept to a token. ``gait`` is
-    an index into :data:`loco_drake.gaits.LABELS` that overrides it for the chunks still
-    to be written, so that a change comes ``horizon`` and up to a chunk later. What is
-    written depends only on seed, number of the chunk and labels, so that a Context that
-    is cloned or reset repeats it exactly.
+    an index into :data:`loco_drake.motion.gaits.LABELS` that overrides it for the
+    chunks still to be written, so that a change comes ``horizon`` and up to a chunk
+    later. What is written depends only on seed, number of the chunk and labels, so that
+    a Context that is cloned or reset repeats it exactly.
 
     Args:
         robot: the robot that is to move.

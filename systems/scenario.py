@@ -5,7 +5,7 @@ from pathlib import Path
 
 from pydrake.common.yaml import yaml_load_typed
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.models.plant import PlantConfig
 
 from .toppra_smoother import SmootherConfig

@@ -9,11 +9,17 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 from scipy.interpolate import CubicSpline
 
+from loco_drake.common.rotations import quat_continuous
+from loco_drake.control.plan import (
+    LOOK_PERIOD,
+    PLAN_DT,
+    Plan,
+    join_plans,
+    make_plan,
+    standing_plan,
+)
+from loco_drake.control.retiming import Clock, PathLimits, path_limits, retime
 from loco_drake.models.robots import Robot
-from loco_drake.rotations import quat_continuous
-
-from .plan import LOOK_PERIOD, PLAN_DT, Plan, join_plans, make_plan, standing_plan
-from .retiming import Clock, PathLimits, path_limits, retime
 
 Array = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from typing import Any
 import torch
 from pydrake.systems.framework import Context, LeafSystem
 
-from .actor import Actor
-from .observation import OBSERVATION_SIZE
+from loco_drake.control.actor import Actor
+from loco_drake.control.observation import OBSERVATION_SIZE
 
 
 class TrackingPolicy(LeafSystem):

@@ -2,11 +2,16 @@
 
 import numpy as np
 
-from loco_drake.gaits import parse_label
+from loco_drake.common.rotations import (
+    quat_conjugate,
+    quat_multiply,
+    quat_rotate,
+    yaw_quat,
+)
 from loco_drake.models.kinematics import leg_joints
 from loco_drake.models.robots import get_robot
-from loco_drake.motion import FPS, Motion, make_motion
-from loco_drake.rotations import quat_conjugate, quat_multiply, quat_rotate, yaw_quat
+from loco_drake.motion.gaits import parse_label
+from loco_drake.motion.motion import FPS, Motion, make_motion
 
 # Phase of each foot behind RL, as a share of the stride.
 PHASES = {"trot": (0.5, 0.0, 0.0, 0.5), "pace": (0.0, 0.5, 0.0, 0.5)}

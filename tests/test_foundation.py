@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.errors import InputError
-from loco_drake.files import atomic_path, cache_dir
-from loco_drake.gaits import GAITS, LABELS, ONE_HOT, SOURCES, parse_label
-from loco_drake.keypoints import KeypointClip
-from loco_drake.weights import load_into, load_weights, save_weights
+from loco_drake.common.errors import InputError
+from loco_drake.common.files import atomic_path, cache_dir
+from loco_drake.common.weights import load_into, load_weights, save_weights
+from loco_drake.motion.gaits import GAITS, LABELS, ONE_HOT, SOURCES, parse_label
+from loco_drake.motion.keypoints import KeypointClip
 
 
 def test_there_are_the_papers_fifteen_labels():
@@ -96,7 +96,7 @@ def test_wrong_weights_are_refused_in_a_sentence(tmp_path):
 
 def test_weights_of_a_later_format_are_refused(tmp_path, monkeypatch):
     path = tmp_path / "w.safetensors"
-    monkeypatch.setattr("loco_drake.weights.FORMAT_VERSION", 9)
+    monkeypatch.setattr("loco_drake.common.weights.FORMAT_VERSION", 9)
     save_weights(path, "policy", {"a": torch.zeros(3)}, {})
     monkeypatch.undo()
     with pytest.raises(InputError, match="format 9; this version reads 1"):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from loco_drake.motion import Motion, make_motion
+from loco_drake.motion.motion import Motion, make_motion
 from tests.synthetic_motion import synthetic_motion
 
 

@@ -8,9 +8,9 @@ from typing import Any
 import tyro
 
 from loco_drake.cli.output import print_table, write_json
+from loco_drake.common.files import atomic_path
 from loco_drake.datasets.registry import DATASETS, data_dir, read_clip
 from loco_drake.datasets.segments import read_segments
-from loco_drake.files import atomic_path
 from loco_drake.retargeting.inspection import ClipSummary, clip_figure, summarize
 
 

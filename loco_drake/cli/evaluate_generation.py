@@ -20,18 +20,18 @@ from loco_drake.cli.output import (
     write_json,
 )
 from loco_drake.cli.trained_on import trained_on
+from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.datasets.registry import data_dir
-from loco_drake.errors import InputError, check_at_least
 from loco_drake.evaluation.generation import Generated, GenerationScore
 from loco_drake.evaluation.generation_pictures import confusion_figure, motion_figure
 from loco_drake.evaluation.model_figures import Effort, score_model, score_motions
 from loco_drake.evaluation.recorded import Recorded, retarget_recordings
 from loco_drake.evaluation.train_classifier import STEPS
-from loco_drake.gaits import LABELS, SOURCES, parse_label
 from loco_drake.generation.motion_model import MotionModel, load_motion_model
-from loco_drake.generation.pretrained import pretrained_path
 from loco_drake.models.robots import Robot, get_robot
-from loco_drake.motion import FPS, Motion, load_motion
+from loco_drake.models.shipped import pretrained_path
+from loco_drake.motion.gaits import LABELS, SOURCES, parse_label
+from loco_drake.motion.motion import FPS, Motion, load_motion
 
 
 @dataclass(kw_only=True)

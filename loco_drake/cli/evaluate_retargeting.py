@@ -8,9 +8,9 @@ from rich.console import Console
 from rich.progress import Progress
 
 from loco_drake.cli.output import print_failed, print_figures, write_json
+from loco_drake.common.errors import check_at_least, check_choice
 from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments, select_labels
-from loco_drake.errors import check_at_least, check_choice
 from loco_drake.evaluation.retargeting import score_segments, summarize
 from loco_drake.models.robot_files import is_robot_file, load_robot
 from loco_drake.models.robots import ROBOTS

@@ -11,15 +11,15 @@ from loco_drake.cli.evaluation import (
 )
 from loco_drake.cli.output import print_failed, print_table, write_json
 from loco_drake.cli.trained_on import trained_on
+from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.datasets.registry import data_dir
-from loco_drake.errors import InputError, check_at_least
 from loco_drake.evaluation.generation_pictures import code_use_figure
 from loco_drake.evaluation.recorded import retarget_recordings
 from loco_drake.evaluation.tokenizer import evaluate_tokenizer
-from loco_drake.gaits import parse_label
-from loco_drake.generation.pretrained import pretrained_path
 from loco_drake.generation.tokenizer import Tokenizer, load_tokenizer
 from loco_drake.models.robots import get_robot
+from loco_drake.models.shipped import pretrained_path
+from loco_drake.motion.gaits import parse_label
 
 
 @dataclass(kw_only=True)

@@ -8,9 +8,10 @@ from rich.console import Console
 from rich.progress import Progress
 
 from loco_drake.cli.output import print_figures, write_json
+from loco_drake.common.errors import check_at_least, check_choice
+from loco_drake.control.actor import load_actor
 from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments
-from loco_drake.errors import check_at_least, check_choice
 from loco_drake.evaluation.tracking_table import (
     Trial,
     generated_trials,
@@ -18,12 +19,11 @@ from loco_drake.evaluation.tracking_table import (
     run_trials,
     summarize,
 )
-from loco_drake.gaits import parse_label
 from loco_drake.generation.generate import check_duration
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS, get_robot
-from loco_drake.systems.actor import load_actor
-from loco_drake.systems.pretrained import policy_path
+from loco_drake.models.shipped import policy_path
+from loco_drake.motion.gaits import parse_label
 from loco_drake.systems.scenario import (
     GeneratedReference,
     PlanReference,

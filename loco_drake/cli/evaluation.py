@@ -6,8 +6,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from loco_drake.errors import InputError, check_choice
-from loco_drake.files import atomic_path
+from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.files import atomic_path
 from loco_drake.models.robots import ROBOTS
 
 

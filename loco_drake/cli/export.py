@@ -7,10 +7,10 @@ from typing import Annotated
 import tyro
 
 from loco_drake.cli.output import print_table, write_json
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
+from loco_drake.control.actor import load_actor
 from loco_drake.models.robots import get_robot
-from loco_drake.systems.actor import load_actor
-from loco_drake.systems.pretrained import policy_path
+from loco_drake.models.shipped import policy_path
 from loco_drake.tracking.onnx_policy import export_onnx
 
 

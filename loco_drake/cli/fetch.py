@@ -16,6 +16,7 @@ from rich.progress import (
 )
 
 from loco_drake.cli.output import print_table, write_json
+from loco_drake.common.errors import InputError, check_choice
 from loco_drake.datasets.download import (
     Outcome,
     download_files,
@@ -25,7 +26,6 @@ from loco_drake.datasets.download import (
 from loco_drake.datasets.manifest import RemoteFile, files_by_source
 from loco_drake.datasets.registry import DATASETS, data_target
 from loco_drake.datasets.segment_table import add_shipped_rows, read_rows, write_rows
-from loco_drake.errors import InputError, check_choice
 
 # Parts of the names of Creative Commons licences, and what they ask.
 _CONDITIONS = {

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from loco_drake.cli.output import print_table, write_json
-from loco_drake.errors import check_at_least, check_choice
-from loco_drake.gait_schedule import parse_schedule
+from loco_drake.common.errors import check_at_least, check_choice
 from loco_drake.generation.generate import (
     check_duration,
     check_pace,
@@ -14,9 +13,10 @@ from loco_drake.generation.generate import (
     generate_motions,
 )
 from loco_drake.generation.motion_model import load_motion_model
-from loco_drake.generation.pretrained import pretrained_path
 from loco_drake.models.robots import ROBOTS
-from loco_drake.motion import FPS, save_motion
+from loco_drake.models.shipped import pretrained_path
+from loco_drake.motion.gait_schedule import parse_schedule
+from loco_drake.motion.motion import FPS, save_motion
 
 BATCH = 32  # motions side by side
 

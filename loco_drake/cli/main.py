@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from loco_drake import __version__
-from loco_drake.errors import InputError, check_choice
+from loco_drake.common.errors import InputError, check_choice
 
 # Command: module, class, what it does. A module is imported only when its command is
 # asked for: --help should not wait for torch and Drake.

@@ -10,7 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from loco_drake.files import atomic_path
+from loco_drake.common.files import atomic_path
 
 
 def write_json(path: Path | None, figures: dict[str, Any]) -> None:

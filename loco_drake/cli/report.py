@@ -6,10 +6,10 @@ from pathlib import Path
 from rich.console import Console
 
 from loco_drake.cli.output import print_table, write_json
-from loco_drake.errors import InputError, check_at_least
+from loco_drake.common.errors import InputError, check_at_least
+from loco_drake.common.files import atomic_path
 from loco_drake.evaluation.report.build import DEFAULT_REPLAYS, build_report
 from loco_drake.evaluation.report.results import results_dir
-from loco_drake.files import atomic_path
 from loco_drake.generation.generate import check_duration
 
 

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from loco_drake.cli.output import print_failed, print_table, write_json
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.registry import data_dir, read_clip
 from loco_drake.datasets.segments import (
     Segment,
@@ -17,9 +18,8 @@ from loco_drake.datasets.segments import (
     select_segments,
 )
 from loco_drake.datasets.split import TRAIN, VALIDATION, Split
-from loco_drake.errors import InputError
-from loco_drake.gaits import LABELS
 from loco_drake.models.robot_files import load_robot
+from loco_drake.motion.gaits import LABELS
 from loco_drake.retargeting.batch import Outcome, retarget_segments, stretches_of
 from loco_drake.retargeting.trajectories import (
     SECONDS,

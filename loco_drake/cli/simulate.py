@@ -11,16 +11,16 @@ import tyro
 from pydrake.geometry import Meshcat, MeshcatParams
 
 from loco_drake.cli.output import print_table, write_json
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
+from loco_drake.common.files import atomic_path
+from loco_drake.control.plan import PLAN_DT
 from loco_drake.evaluation.replay import FRAMES_PER_SECOND, dress, frame
 from loco_drake.evaluation.rollout import Recorder
 from loco_drake.evaluation.tracking import tracking_metrics
-from loco_drake.files import atomic_path
-from loco_drake.gait_schedule import parse_schedule
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot
-from loco_drake.motion import Motion, load_motion
-from loco_drake.systems.plan import PLAN_DT
+from loco_drake.motion.gait_schedule import parse_schedule
+from loco_drake.motion.motion import Motion, load_motion
 from loco_drake.systems.scenario import (
     GeneratedReference,
     MotionReference,

@@ -8,9 +8,9 @@ from typing import Any
 from loco_drake.cli.evaluation import estimate_text
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.cli.training import check_steps, print_stopped
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.evaluation.classifier import ClassifierConfig, predict
-from loco_drake.evaluation.intervals import accuracy
+from loco_drake.evaluation.confidence import accuracy
 from loco_drake.evaluation.recorded import load_recorded
 from loco_drake.evaluation.samples import SECONDS, label_weights, make_samples
 from loco_drake.evaluation.train_classifier import (
@@ -19,8 +19,8 @@ from loco_drake.evaluation.train_classifier import (
     class_indices,
     train_classifier,
 )
-from loco_drake.gaits import LABELS
 from loco_drake.generation.training import LoopSettings
+from loco_drake.motion.gaits import LABELS
 from loco_drake.retargeting.trajectories import trajectories
 
 

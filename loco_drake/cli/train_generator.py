@@ -6,9 +6,8 @@ from pathlib import Path
 
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.cli.training import check_steps, print_stopped
-from loco_drake.errors import InputError, check_at_least
+from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.generation.generator import GeneratorConfig
-from loco_drake.generation.library import load_library
 from loco_drake.generation.tokenizer import load_tokenizer
 from loco_drake.generation.train_generator import (
     STITCHED,
@@ -16,6 +15,7 @@ from loco_drake.generation.train_generator import (
     train_generator,
 )
 from loco_drake.generation.training import LoopSettings
+from loco_drake.generation.training_motions import load_library
 
 
 @dataclass(kw_only=True)

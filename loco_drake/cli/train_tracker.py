@@ -17,10 +17,10 @@ from rich.progress import (
 
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.cli.training import print_stopped
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot
-from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.environment_config import EnvironmentConfig
 from loco_drake.tracking.ppo import PpoConfig
 from loco_drake.tracking.randomization import RandomizationConfig
 from loco_drake.tracking.references import load_references

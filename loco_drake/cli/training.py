@@ -4,7 +4,7 @@ from math import isfinite
 
 from rich.console import Console
 
-from loco_drake.errors import InputError, check_at_least
+from loco_drake.common.errors import InputError, check_at_least
 
 
 def check_steps(steps: int, learning_rate: float) -> None:

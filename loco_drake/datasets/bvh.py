@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.text import parse_numbers, read_lines
-from loco_drake.errors import InputError
 
 Array = NDArray[np.float64]
 

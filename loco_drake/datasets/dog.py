@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.bvh import END_SITE, read_bvh
 from loco_drake.datasets.normalize import (
     check_range,
@@ -21,8 +22,7 @@ from loco_drake.datasets.normalize import (
     start_along_x,
 )
 from loco_drake.datasets.text import read_lines, read_table
-from loco_drake.errors import InputError
-from loco_drake.keypoints import KeypointClip
+from loco_drake.motion.keypoints import KeypointClip
 
 FPS = 60.0
 COLUMNS = 81

@@ -8,9 +8,9 @@ from urllib.parse import quote
 import pooch
 import requests
 
+from loco_drake.common.errors import InputError
+from loco_drake.common.files import atomic_path
 from loco_drake.datasets.manifest import RemoteFile
-from loco_drake.errors import InputError
-from loco_drake.files import atomic_path
 
 # Without a connection every file would wait for its timeout: so many in a row suffice.
 LOST_CONNECTIONS = 3

@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from loco_drake.common.errors import InputError
+from loco_drake.common.runs import intervals
 from loco_drake.datasets.normalize import check_range
-from loco_drake.errors import InputError
-from loco_drake.intervals import intervals
 
 Array = NDArray[np.float64]
 

@@ -19,13 +19,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.gaps import mend_gaps, usable_stretch
 from loco_drake.datasets.normalize import check_steps, ground_toes, start_along_x
 from loco_drake.datasets.strides import infer_rate
 from loco_drake.datasets.text import read_lines, read_named_table, read_table
 from loco_drake.datasets.treadmill import trunk_path
-from loco_drake.errors import InputError
-from loco_drake.keypoints import KeypointClip
+from loco_drake.motion.keypoints import KeypointClip
 
 Array = NDArray[np.float64]
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.errors import InputError
+from loco_drake.common.runs import intervals
 from loco_drake.datasets.normalize import check_range, start_along_x
 from loco_drake.datasets.simulated import read_points, trunk_ends
-from loco_drake.errors import InputError
-from loco_drake.intervals import intervals
-from loco_drake.keypoints import KeypointClip
+from loco_drake.motion.keypoints import KeypointClip
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

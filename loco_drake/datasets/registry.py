@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
+from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.files import cache_dir
 from loco_drake.datasets.dog import read_dog
 from loco_drake.datasets.horse import read_horse
 from loco_drake.datasets.mpc import read_mpc
 from loco_drake.datasets.solo8 import read_solo8
-from loco_drake.errors import InputError, check_choice
-from loco_drake.files import cache_dir
-from loco_drake.keypoints import KeypointClip
+from loco_drake.motion.keypoints import KeypointClip
 
 DATA_VARIABLE = "LOCO_DRAKE_DATA"
 
@@ -37,7 +37,7 @@ class Dataset:
     """One source of motion.
 
     Attributes:
-        source: one of :data:`loco_drake.gaits.SOURCES`.
+        source: one of :data:`loco_drake.motion.gaits.SOURCES`.
         folder: name of its folder inside the data folder.
         licence: under which its files, and all that is made from them, may be used.
         attribution: whom to name.

@@ -4,8 +4,8 @@ import csv
 from collections.abc import Iterable
 from pathlib import Path
 
-from loco_drake.errors import InputError
-from loco_drake.files import atomic_path
+from loco_drake.common.errors import InputError
+from loco_drake.common.files import atomic_path
 
 SHIPPED = Path(__file__).with_name("segments.csv")
 COLUMNS = ("dataset", "file", "gait", "start_frame", "end_frame", "fps")

@@ -5,10 +5,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from loco_drake.common.errors import InputError, check_choice
 from loco_drake.datasets.registry import DATASETS, read_clip
 from loco_drake.datasets.segment_table import read_rows
-from loco_drake.errors import InputError, check_choice
-from loco_drake.keypoints import KeypointClip
+from loco_drake.motion.keypoints import KeypointClip
 
 # Horse<animal>_M<day of measurement>_<gait><number>...
 _HORSE = re.compile(r"(Horse\d+)_M\d+_")
@@ -19,7 +19,7 @@ class Segment:
     """A stretch of a recording that holds one gait.
 
     Attributes:
-        source: one of :data:`loco_drake.gaits.SOURCES`.
+        source: one of :data:`loco_drake.motion.gaits.SOURCES`.
         path: the file.
         gait: name of the gait; need not be one of the fifteen labels.
         start: first frame, from 0, at the file's own rate.

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.normalize import check_steps
 from loco_drake.datasets.text import read_table
-from loco_drake.errors import InputError
 
 Array = NDArray[np.float64]
 

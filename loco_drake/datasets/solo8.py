@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.normalize import check_range, start_along_x
 from loco_drake.datasets.simulated import read_points, trunk_ends
-from loco_drake.errors import InputError
-from loco_drake.keypoints import KeypointClip
+from loco_drake.motion.keypoints import KeypointClip
 
 FORMAT = "a solo8 keypoint file"
 FPS = 50.0

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from loco_drake.datasets.segments import Segment
-from loco_drake.gaits import LABELS, GaitLabel
+from loco_drake.motion.gaits import LABELS, GaitLabel
 
 TRAIN, VALIDATION = "train", "validation"
 

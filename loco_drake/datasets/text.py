@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 
 # Recordings known here have up to 3 MB, 90 s; this is enough for 25 minutes.
 MAX_BYTES = 50_000_000

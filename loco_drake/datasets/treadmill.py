@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_smoothing_spline
 from scipy.ndimage import binary_erosion
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -14,9 +14,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from loco_drake.common.determinism import single_thread
+from loco_drake.common.weights import load_network, save_weights
 from loco_drake.evaluation.samples import CHANNELS, FRAMES
-from loco_drake.generation.determinism import single_thread
-from loco_drake.weights import load_network, save_weights
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ The last 10 s of each motion are compared with its first 10 s in five figures:
 speed            of the base along its heading, m/s
 height           mean of the base's, m
 turn rate        change of the heading over the 10 s, rad/s
-stride period    see :mod:`loco_drake.gait_timing`, s
+stride period    see :mod:`loco_drake.motion.gait_timing`, s
 slip             median speed of the toes in stance, m/s
 
 A figure's change is the median over motions of ``|last - first|``. How much two samples
@@ -30,13 +30,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.rotations import yaw_of
 from loco_drake.evaluation.motion_scores import mean_speed
-from loco_drake.gait_timing import motion_track, stride_period
 from loco_drake.models.robots import Robot
-from loco_drake.motion import Motion
-from loco_drake.motion_quality import stance_slip_median, toe_trajectories
+from loco_drake.motion.gait_timing import motion_track, stride_period
+from loco_drake.motion.motion import Motion
+from loco_drake.motion.quality import stance_slip_median, toe_trajectories
 from loco_drake.retargeting.trajectories import trajectories
-from loco_drake.rotations import yaw_of
 
 Array = NDArray[np.float64]
 

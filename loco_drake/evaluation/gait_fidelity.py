@@ -1,14 +1,14 @@
 """How well a robot keeps the rhythm of the animal that it moves like.
 
-Both rhythms are those of :mod:`loco_drake.gait_timing`: that of the animal from its
-keypoints, that of the robot from its kinematics, neither from contact labels.
+Both rhythms are those of :mod:`loco_drake.motion.gait_timing`: that of the animal from
+its keypoints, that of the robot from its kinematics, neither from contact labels.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from loco_drake.gait_timing import GaitTiming, Track, gait_timing
+from loco_drake.motion.gait_timing import GaitTiming, Track, gait_timing
 
 # The animal decides whether there are enough strides: a robot's motion can end a frame
 # before its clip, and a slower robot makes fewer strides.

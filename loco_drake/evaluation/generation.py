@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.evaluation import drift as drifting
 from loco_drake.evaluation.classifier import embeddings
 from loco_drake.evaluation.frechet import frechet_distance, moments
@@ -30,9 +30,9 @@ from loco_drake.evaluation.samples import (
     make_samples,
 )
 from loco_drake.evaluation.two_sample import FOLDS, two_sample_accuracy
-from loco_drake.gaits import LABELS
 from loco_drake.models.robots import Robot
-from loco_drake.motion import Motion
+from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.motion import Motion
 from loco_drake.retargeting.trajectories import trajectories
 
 Array = NDArray[np.float64]

@@ -8,18 +8,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from loco_drake.evaluation.recognition import Recognition
-from loco_drake.gaits import LABELS
-from loco_drake.models.kinematics import toe_positions
-from loco_drake.models.robots import Robot
-from loco_drake.motion import Motion
-from loco_drake.rotations import (
+from loco_drake.common.rotations import (
     quat_conjugate,
     quat_multiply,
     quat_rotate,
     yaw_of,
     yaw_quat,
 )
+from loco_drake.evaluation.recognition import Recognition
+from loco_drake.models.kinematics import toe_positions
+from loco_drake.models.robots import Robot
+from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.motion import Motion
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.evaluation import drift as drifting
 from loco_drake.evaluation.generation import (
     Generated,
@@ -18,11 +18,11 @@ from loco_drake.evaluation.motion_scores import NULL_FIGURES
 from loco_drake.evaluation.recorded import Recorded
 from loco_drake.evaluation.samples import FRAMES, SECONDS
 from loco_drake.evaluation.transfer import pair_up, transfer_rmse
-from loco_drake.gaits import GaitLabel, parse_label
 from loco_drake.generation.generate import generate_motion, generate_motions
 from loco_drake.generation.motion_model import MotionModel
 from loco_drake.models.robots import Robot
-from loco_drake.motion import Motion
+from loco_drake.motion.gaits import GaitLabel, parse_label
+from loco_drake.motion.motion import Motion
 from loco_drake.retargeting.trajectories import trajectories
 
 TIMED_SECONDS = 10.0

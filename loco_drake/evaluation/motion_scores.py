@@ -2,7 +2,7 @@
 
 ======================== ==============================================================
 stance_slip_median_mps   median speed of all toes in stance, pooled over all motions;
-                         see :func:`loco_drake.motion_quality.stance_slip_speeds`
+                         see :func:`loco_drake.motion.quality.stance_slip_speeds`
 penetration_max_m        deepest below the ground of any toe of any motion
 jerk_ratio               RMS of the joints' jerk, over that of recorded motion
 speed_error_mps          ``|mean speed - mean speed of recorded motion|``
@@ -27,8 +27,8 @@ from scipy.stats import gmean, wasserstein_distance
 
 from loco_drake.generation.features import VELOCITY, motion_features
 from loco_drake.models.robots import Robot
-from loco_drake.motion import Motion
-from loco_drake.motion_quality import (
+from loco_drake.motion.motion import Motion
+from loco_drake.motion.quality import (
     penetration_max,
     stance_slip_speeds,
     toe_trajectories,

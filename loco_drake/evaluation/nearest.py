@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from loco_drake.evaluation.samples import subject_of
-from loco_drake.motion import FPS, Motion
+from loco_drake.motion.motion import FPS, Motion
 
 Array = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.evaluation.classifier import ClassifierConfig, GaitClassifier, predict
-from loco_drake.evaluation.intervals import Estimate, accuracy
+from loco_drake.evaluation.confidence import Estimate, accuracy
 from loco_drake.evaluation.samples import (
     Samples,
     choose_per_label,
@@ -41,8 +41,8 @@ from loco_drake.evaluation.train_classifier import (
     fit_linear,
     train_classifier,
 )
-from loco_drake.gaits import LABELS, SOURCES
 from loco_drake.generation.training import LoopSettings
+from loco_drake.motion.gaits import LABELS, SOURCES
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]

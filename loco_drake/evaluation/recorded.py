@@ -5,14 +5,14 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
+from loco_drake.common.errors import InputError
+from loco_drake.common.parallel import map_in_workers
 from loco_drake.datasets.segments import Segment, read_segments, select_labels
 from loco_drake.datasets.split import VALIDATION, Split
-from loco_drake.errors import InputError
 from loco_drake.evaluation.samples import FRAMES
-from loco_drake.gaits import LABELS
 from loco_drake.models.robots import Robot, get_robot
-from loco_drake.motion import Motion, load_motion
-from loco_drake.parallel import map_in_workers
+from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.motion import Motion, load_motion
 from loco_drake.retargeting.batch import SegmentRetargeter
 
 

@@ -1,6 +1,6 @@
 """How well recordings are retargeted, label by label.
 
-The figures of a clip are those of :mod:`loco_drake.motion_quality`,
+The figures of a clip are those of :mod:`loco_drake.motion.quality`,
 :class:`loco_drake.retargeting.retarget.RetargetReport` and
 :mod:`loco_drake.evaluation.gait_fidelity`. A label's figures are made of its clips':
 
@@ -28,14 +28,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.parallel import map_in_workers
 from loco_drake.datasets.segments import Segment
 from loco_drake.evaluation.gait_fidelity import GaitFidelity, gait_fidelity
-from loco_drake.gait_timing import clip_track, motion_track
-from loco_drake.gaits import LABELS
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.models.robot_files import load_robot
-from loco_drake.motion_quality import stance_slip_speeds, toe_trajectories
-from loco_drake.parallel import map_in_workers
+from loco_drake.motion.gait_timing import clip_track, motion_track
+from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.quality import stance_slip_speeds, toe_trajectories
 from loco_drake.retargeting.batch import SegmentRetargeter
 from loco_drake.retargeting.retarget import RetargetReport
 from loco_drake.retargeting.variants import AS_RECORDED, Variant

@@ -9,13 +9,14 @@ from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, EventStatus
 
+from loco_drake.control.domain import Domain
+from loco_drake.control.fall import has_fallen
+from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.evaluation.tracking import Rollout
 from loco_drake.models.plant import ConfigureSimulator
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
-from loco_drake.systems.domain import Domain, SetDomain
-from loco_drake.systems.fall import has_fallen
-from loco_drake.systems.plan import PLAN_DT, Plan
+from loco_drake.systems.domain import SetDomain
 from loco_drake.systems.scenario import Scenario
 
 _RECORDED = ("state", "plan_state", "path_time", "desired_state", "reward_terms")

@@ -33,7 +33,7 @@ from loco_drake.generation.features import (
     motion_features,
 )
 from loco_drake.models.robots import Robot
-from loco_drake.motion import FPS, Motion
+from loco_drake.motion.motion import FPS, Motion
 
 Array = NDArray[np.float64]
 

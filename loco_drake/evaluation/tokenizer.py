@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.evaluation.recorded import Recorded
-from loco_drake.gaits import LABELS
-from loco_drake.generation.library import Clip, motion_clip
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.tokenizer_score import code_counts, score_tokenizer
+from loco_drake.generation.training_motions import Clip, motion_clip
+from loco_drake.motion.gaits import LABELS
 
 FIGURES = ("joint_rmse_rad", "toe_error_rmse_m")
 NO_RECORDINGS = "No recording of this label is held out."

@@ -9,19 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.models.kinematics import toe_positions
-from loco_drake.models.robots import Robot
-from loco_drake.motion import FPS
-from loco_drake.motion_quality import stance_slip_speeds
-from loco_drake.rotations import (
+from loco_drake.common.rotations import (
     quat_error,
     quat_multiply,
     quat_rotate,
     yaw_of,
     yaw_quat,
 )
-from loco_drake.systems.feed_forward import GRAVITY
-from loco_drake.systems.plan import PLAN_DT
+from loco_drake.control.feed_forward import GRAVITY
+from loco_drake.control.plan import PLAN_DT
+from loco_drake.models.kinematics import toe_positions
+from loco_drake.models.robots import Robot
+from loco_drake.motion.motion import FPS
+from loco_drake.motion.quality import stance_slip_speeds
 
 Array = NDArray[np.float64]
 
@@ -125,7 +125,7 @@ def speed(rollout: Rollout) -> float:
 def slip_speeds(rollout: Rollout, robot: Robot) -> Array:
     """Horizontal speeds of the simulated toes in stance, m/s, shape (M,).
 
-    See :func:`loco_drake.motion_quality.stance_slip_speeds`.
+    See :func:`loco_drake.motion.quality.stance_slip_speeds`.
     """
     q = rollout.state[:, :19]
     p_WF = q[:, None, 4:7] + quat_rotate(q[:, None, :4], toe_positions(robot, q[:, 7:]))

@@ -25,19 +25,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.errors import InputError
+from loco_drake.common.parallel import map_in_workers
+from loco_drake.control.plan import PLAN_DT, plan_from_motion
 from loco_drake.datasets.segments import Segment
-from loco_drake.errors import InputError
 from loco_drake.evaluation.rollout import Recorder
 from loco_drake.evaluation.tracking import (
     effort_metrics,
     slip_speeds,
     tracking_metrics,
 )
-from loco_drake.gaits import parse_label
 from loco_drake.models.robots import get_robot
-from loco_drake.parallel import map_in_workers
+from loco_drake.motion.gaits import parse_label
 from loco_drake.retargeting.batch import SegmentRetargeter
-from loco_drake.systems.plan import PLAN_DT, plan_from_motion
 from loco_drake.systems.scenario import PlanReference, Scenario
 from loco_drake.tracking.randomization import RandomizationConfig
 

@@ -18,8 +18,8 @@ from loco_drake.evaluation.classifier import (
     save_classifier,
 )
 from loco_drake.evaluation.samples import CHANNELS, Samples, label_weights
-from loco_drake.gaits import LABELS
 from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.motion.gaits import LABELS
 
 BATCH = 48
 STEPS = 300

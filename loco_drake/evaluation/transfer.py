@@ -10,12 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
+from loco_drake.common.determinism import single_thread
 from loco_drake.evaluation.samples import subject_of
-from loco_drake.generation.determinism import single_thread
 from loco_drake.generation.features import JOINTS, motion_features
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.models.robots import get_robot
-from loco_drake.motion import Motion
+from loco_drake.motion.motion import Motion
 
 
 def transfer_rmse(

@@ -16,7 +16,7 @@ from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
-from loco_drake.evaluation.intervals import Estimate, accuracy
+from loco_drake.evaluation.confidence import Estimate, accuracy
 from loco_drake.evaluation.samples import (
     Samples,
     choose_per_label,
@@ -56,7 +56,7 @@ def two_sample_accuracy(
         fit: which classifier of the summaries, a key of FITS.
 
     Returns:
-        Accuracy and interval, see :func:`loco_drake.evaluation.intervals.accuracy`;
+        Accuracy and interval, see :func:`loco_drake.evaluation.confidence.accuracy`;
         None if there are fewer than FOLDS subjects in either set.
     """
     counts_a, counts_b = count_per_label(a), count_per_label(b)

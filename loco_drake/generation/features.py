@@ -9,9 +9,9 @@ another of like proportions.
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.rotations import quat_conjugate, quat_multiply, yaw_of, yaw_quat
 from loco_drake.models.robots import Robot
-from loco_drake.motion import FPS, Motion
-from loco_drake.rotations import quat_conjugate, quat_multiply, yaw_of, yaw_quat
+from loco_drake.motion.motion import FPS, Motion
 
 Array = NDArray[np.float64]
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.rotations import quat_conjugate, quat_rotate
 from loco_drake.generation import features as ft
 from loco_drake.generation.features import positions, rotate_plane
 from loco_drake.models.kinematics import leg_joints, toe_positions
 from loco_drake.models.robots import Robot
-from loco_drake.motion import FPS
-from loco_drake.rotations import quat_conjugate, quat_rotate
+from loco_drake.motion.motion import FPS
 
 Array = NDArray[np.float64]
 

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.errors import InputError
-from loco_drake.gait_schedule import GaitSchedule
-from loco_drake.gaits import GaitLabel
+from loco_drake.common.errors import InputError
 from loco_drake.generation.motion_model import MotionModel
-from loco_drake.motion import FPS, Motion
+from loco_drake.motion.gait_schedule import GaitSchedule
+from loco_drake.motion.gaits import GaitLabel
+from loco_drake.motion.motion import FPS, Motion
 
 Integers = NDArray[np.int64]
 
@@ -31,7 +31,8 @@ def generate_motions(
     """Generates one motion for each seed, side by side.
 
     Args:
-        model: from :mod:`loco_drake.generation.pretrained` or one's own training.
+        model: from
+            :func:`.motion_model.pretrained_motion_model` or one's own training.
         gait: one that the generator was trained on, or several after each other.
             The motion's label is then SEVERAL; its provenance says which.
         duration: from first to last frame, in s, at most LONGEST_DURATION.

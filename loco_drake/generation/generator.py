@@ -15,10 +15,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from loco_drake.gaits import LABELS, ONE_HOT, ONE_HOT_SIZE
-from loco_drake.generation import pace
+from loco_drake.common.weights import load_network, save_weights
+from loco_drake.generation import speed_rank
 from loco_drake.generation.layers import RotaryAttention
-from loco_drake.weights import load_network, save_weights
+from loco_drake.motion.gaits import LABELS, ONE_HOT, ONE_HOT_SIZE
 
 # Durations are binned on a log scale; the last bin is "long" and never ends.
 DURATION_BINS = 16
@@ -109,9 +109,11 @@ class Generator(nn.Module):
         # Tables of all books lie in one; book j begins at row j * (size + 1).
         self.codes_in = nn.Embedding(books * (size + 1), width)
         self.gait_in = nn.Linear(ONE_HOT_SIZE, width, bias=False)
-        self.pace_in = nn.Embedding(pace.BINS, width)
-        # Stand heights per second, see pace.speed_edges.
-        self.register_buffer("speed_edges", torch.zeros(len(LABELS), pace.BINS - 1))
+        self.pace_in = nn.Embedding(speed_rank.BINS, width)
+        # Stand heights per second, see speed_rank.speed_edges.
+        self.register_buffer(
+            "speed_edges", torch.zeros(len(LABELS), speed_rank.BINS - 1)
+        )
         self.speed_edges: Tensor
         self.duration_in = nn.Embedding(DURATION_BINS, width)
         self.dropout = nn.Dropout(config.dropout)

@@ -2,6 +2,7 @@
 
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +10,17 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from loco_drake.errors import InputError
-from loco_drake.gaits import LABELS
-from loco_drake.generation.determinism import single_thread, uniforms
+from loco_drake.common.determinism import single_thread, uniforms
+from loco_drake.common.errors import InputError
+from loco_drake.common.rotations import quat_error
 from loco_drake.generation.footing import Footing, start_footing, step_footing
 from loco_drake.generation.generator import Generator, duration_bin, load_generator
-from loco_drake.generation.pace import drawn_rank, rank_bin
+from loco_drake.generation.speed_rank import drawn_rank, rank_bin
 from loco_drake.generation.tokenizer import Tokenizer, load_tokenizer
 from loco_drake.models.robots import Robot, get_robot
-from loco_drake.motion import FPS
-from loco_drake.rotations import quat_error
+from loco_drake.models.shipped import pretrained_path
+from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.motion import FPS
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -36,7 +38,8 @@ class Stream:
     Attributes:
         seeds: of each motion, shape (B,).
         duration: how long each is to last, in s, shape (B,).
-        pace: of each, in [0, 1], see :mod:`loco_drake.generation.pace`, shape (B,).
+        pace: of each, in [0, 1], see :mod:`loco_drake.generation.speed_rank`,
+            shape (B,).
         chunk: how many times the stream was extended.
         tokens: the latest ones, shape (B, n, books).
         labels: of ``tokens``, index into gaits.LABELS, shape (B, n).
@@ -346,3 +349,15 @@ def _inverse(a: Array) -> Array:
     x = -cos * a[:, 0] - sin * a[:, 1]
     y = sin * a[:, 0] - cos * a[:, 1]
     return np.stack((x, y, -a[:, 2]), axis=-1)
+
+
+@lru_cache
+def pretrained_motion_model(robot: str) -> MotionModel:
+    """Returns the shipped motion model for ``robot``; it is loaded once.
+
+    Raises:
+        InputError: if there are no weights for that robot.
+    """
+    return load_motion_model(
+        pretrained_path("tokenizer"), pretrained_path("generator"), robot
+    )

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import convolve
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.generation.features import CONTACTS, JOINTS
-from loco_drake.generation.library import Clip
-from loco_drake.motion import FPS
+from loco_drake.generation.training_motions import Clip
+from loco_drake.motion.motion import FPS
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from loco_drake.generation.features import (
     YAW_RATE,
 )
 from loco_drake.models.robots import Robot
-from loco_drake.motion import FPS
+from loco_drake.motion.motion import FPS
 
 
 class Toes(nn.Module):

@@ -14,9 +14,9 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from loco_drake.common.weights import load_network, save_weights
 from loco_drake.generation.features import CONTACTS, SIZE
 from loco_drake.generation.layers import ConvBlock
-from loco_drake.weights import load_network, save_weights
 
 
 @dataclass(frozen=True)

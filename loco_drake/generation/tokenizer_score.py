@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from loco_drake.generation.determinism import single_thread
+from loco_drake.common.determinism import single_thread
 from loco_drake.generation.features import JOINTS
-from loco_drake.generation.library import Clip
 from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer
+from loco_drake.generation.training_motions import Clip
 from loco_drake.models.robots import get_robot
 
 

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from loco_drake.errors import InputError
-from loco_drake.gaits import GaitLabel
-from loco_drake.generation import pace
-from loco_drake.generation.determinism import single_thread
+from loco_drake.common.determinism import single_thread
+from loco_drake.common.errors import InputError
+from loco_drake.generation import speed_rank
 from loco_drake.generation.generator import (
     LONGEST,
     Generator,
@@ -21,13 +20,14 @@ from loco_drake.generation.generator import (
     duration_bin,
     save_generator,
 )
-from loco_drake.generation.library import Clip, Library
 from loco_drake.generation.stitching import Stitcher
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.tokenizer_score import clip_tensor
 from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.generation.training_motions import Clip, Library
 from loco_drake.generation.training_record import training_record
-from loco_drake.motion import FPS
+from loco_drake.motion.gaits import GaitLabel
+from loco_drake.motion.motion import FPS
 
 BATCH = 24  # windows
 GROWTH = 12  # tokens by which a window grows while a chunk is written
@@ -46,7 +46,7 @@ class Codes:
     Attributes:
         label: index into gaits.LABELS.
         codes: shape (n, books).
-        speeds: around each token, see :func:`pace.token_speeds`, shape (n,).
+        speeds: around each token, see :func:`speed_rank.token_speeds`, shape (n,).
     """
 
     label: int
@@ -66,7 +66,9 @@ def encode_clips(
         robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
         with torch.inference_mode(), single_thread():
             codes = tokenizer.encode(clip_tensor(tokenizer, clip), robot)
-        speeds = pace.token_speeds(clip.features, tokenizer.config.frames_per_token)
+        speeds = speed_rank.token_speeds(
+            clip.features, tokenizer.config.frames_per_token
+        )
         encoded.append(Codes(clip.label.index, codes[0, :, :books].numpy(), speeds))
     return encoded
 
@@ -125,7 +127,7 @@ def train_generator(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
         generator = Generator(config)
-    edges = pace.speed_edges((each.label, each.speeds) for each in encoded)
+    edges = speed_rank.speed_edges((each.label, each.speeds) for each in encoded)
     generator.speed_edges.copy_(torch.from_numpy(edges))
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
@@ -172,7 +174,7 @@ def make_batch(
         start = random.integers(len(sequence) - length)
         windows[i] = sequence.codes[start : start + length + 1]
         speeds = sequence.speeds[start + 1 : start + length + 1]
-        paces[i] = pace.speed_bin(edges.numpy(), sequence.label, speeds)
+        paces[i] = speed_rank.speed_bin(edges.numpy(), sequence.label, speeds)
     windows[random.random(batch) < NO_HISTORY, 0] = config.book_size
     before, codes = windows[:, :-1].copy(), windows[:, 1:].copy()
     labels = np.repeat([[sequence.label] for sequence in chosen], length, axis=1)
@@ -214,7 +216,7 @@ def score_generator(
         first = torch.full((1, 1, config.books), config.book_size)
         labels = torch.full(codes.shape[:2], sequence.label)
         edges = generator.speed_edges.numpy()
-        bins = pace.speed_bin(edges, sequence.label, sequence.speeds)
+        bins = speed_rank.speed_bin(edges, sequence.label, sequence.speeds)
         paces = torch.from_numpy(bins)[None]
         duration = torch.from_numpy(duration_bin(np.array([LONGEST])))
         before = torch.cat((first, codes[:, :-1]), dim=1)

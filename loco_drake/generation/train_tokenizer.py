@@ -17,16 +17,16 @@ from torch import Tensor, nn
 from torch.nn import functional
 from vector_quantize_pytorch import ResidualVQ
 
-from loco_drake.errors import InputError
-from loco_drake.gaits import LABELS
+from loco_drake.common.errors import InputError
 from loco_drake.generation.features import CONTACTS
-from loco_drake.generation.library import Clip, Library
 from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
 from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.generation.training_motions import Clip, Library
 from loco_drake.generation.training_record import training_record
 from loco_drake.generation.windows import WINDOW, PairedWindows
 from loco_drake.models.robots import get_robot
+from loco_drake.motion.gaits import LABELS
 
 Array = NDArray[np.float64]
 

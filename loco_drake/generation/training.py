@@ -24,9 +24,9 @@ from rich.progress import (
 from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 
-from loco_drake.errors import InputError
-from loco_drake.generation.determinism import single_thread
-from loco_drake.weights import load_into, load_weights, save_weights
+from loco_drake.common.determinism import single_thread
+from loco_drake.common.errors import InputError
+from loco_drake.common.weights import load_into, load_weights, save_weights
 
 # Returns the loss and figures to log for one batch, drawn with the given generator.
 LossFunction = Callable[[np.random.Generator], tuple[Tensor, dict[str, float]]]

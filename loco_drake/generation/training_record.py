@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from loco_drake import __version__
-from loco_drake.generation.library import Library, recording_name
-from loco_drake.motion import FPS, Motion
-from loco_drake.weights import load_weights
+from loco_drake.common.weights import load_weights
+from loco_drake.generation.training_motions import Library, recording_name
+from loco_drake.motion.motion import FPS, Motion
 
 if TYPE_CHECKING:  # it loads what only training needs
     from loco_drake.generation.training import LoopSettings

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from torch import Tensor
 
 from loco_drake.generation.features import CONTACTS, VELOCITY, YAW_RATE
-from loco_drake.generation.library import Clip, Sampler
+from loco_drake.generation.training_motions import Clip, Sampler
 
 Array = NDArray[np.float64]
 

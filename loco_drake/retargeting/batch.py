@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from loco_drake.common.errors import InputError
+from loco_drake.common.parallel import map_in_workers
 from loco_drake.datasets.segments import Segment
 from loco_drake.datasets.split import Split
-from loco_drake.errors import InputError
-from loco_drake.gaits import GaitLabel
-from loco_drake.keypoints import KeypointClip
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.models.robot_files import load_robot
-from loco_drake.motion import FPS, Motion, save_motion
-from loco_drake.parallel import map_in_workers
+from loco_drake.motion.gaits import GaitLabel
+from loco_drake.motion.keypoints import KeypointClip
+from loco_drake.motion.motion import FPS, Motion, save_motion
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import RetargetReport, retarget_clip
 from loco_drake.retargeting.trajectories import Stretch

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.intervals import intervals
-from loco_drake.keypoints import KeypointClip
-from loco_drake.retargeting.config import ContactConfig
+from loco_drake.common.runs import intervals
+from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.retargeting.smoothing import smooth
+from loco_drake.retargeting.source_config import ContactConfig
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, csr_matrix, eye_array
 from scipy.sparse.linalg import spsolve
 
-from loco_drake.intervals import intervals
+from loco_drake.common.runs import intervals
 from loco_drake.retargeting.smoothing import difference_matrix, penalty
 
 Array = NDArray[np.float64]

@@ -6,19 +6,20 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from loco_drake.gait_timing import clip_track, gait_timing
-from loco_drake.intervals import intervals
-from loco_drake.keypoints import LEGS, KeypointClip
-from loco_drake.retargeting.config import load_config
+from loco_drake.common.runs import intervals
+from loco_drake.models.legs import LEGS
+from loco_drake.motion.gait_timing import clip_track, gait_timing
+from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.retargeting.contacts import detect_contacts
 from loco_drake.retargeting.scaling import stance_height
+from loco_drake.retargeting.source_config import load_config
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class ClipSummary:
-    """What a clip shows; rhythm as defined in :mod:`loco_drake.gait_timing`.
+    """What a clip shows; rhythm as defined in :mod:`loco_drake.motion.gait_timing`.
 
     Attributes:
         frames: of the clip.

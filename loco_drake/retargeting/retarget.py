@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake import motion_quality as quality
-from loco_drake.gaits import GaitLabel
-from loco_drake.keypoints import KeypointClip
+from loco_drake.common.rotations import quat_rotate
 from loco_drake.models.quadruped import Quadruped
-from loco_drake.motion import FPS, Motion, make_motion
-from loco_drake.retargeting.config import RetargetConfig, load_config
+from loco_drake.motion import quality
+from loco_drake.motion.gaits import GaitLabel
+from loco_drake.motion.keypoints import KeypointClip
+from loco_drake.motion.motion import FPS, Motion, make_motion
 from loco_drake.retargeting.contacts import detect_contacts, resample_contacts
 from loco_drake.retargeting.feet import plant_feet
 from loco_drake.retargeting.inverse_kinematics import LegSolver
@@ -22,6 +22,7 @@ from loco_drake.retargeting.scaling import (
     stance_height,
 )
 from loco_drake.retargeting.smoothing import smooth
+from loco_drake.retargeting.source_config import RetargetConfig, load_config
 from loco_drake.retargeting.trunk import raise_trunk
 from loco_drake.retargeting.variants import (
     AS_RECORDED,
@@ -29,12 +30,11 @@ from loco_drake.retargeting.variants import (
     in_time,
     smoothing_in_time,
 )
-from loco_drake.rotations import quat_rotate
 
 
 @dataclass(frozen=True)
 class RetargetReport:
-    """How well one clip was retargeted, see :mod:`loco_drake.motion_quality`.
+    """How well one clip was retargeted, see :mod:`loco_drake.motion.quality`.
 
     Attributes:
         frames: of the motion.

@@ -27,11 +27,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from loco_drake.errors import InputError
-from loco_drake.keypoints import KeypointClip
+from loco_drake.common.errors import InputError
+from loco_drake.common.rotations import (
+    quat_conjugate,
+    quat_multiply,
+    quat_rotate,
+    yaw_quat,
+)
 from loco_drake.models.quadruped import Quadruped
-from loco_drake.retargeting.config import RetargetConfig
-from loco_drake.rotations import quat_conjugate, quat_multiply, quat_rotate, yaw_quat
+from loco_drake.motion.keypoints import KeypointClip
+from loco_drake.retargeting.source_config import RetargetConfig
 
 Array = NDArray[np.float64]
 

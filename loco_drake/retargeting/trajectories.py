@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.split import TRAIN, VALIDATION
-from loco_drake.errors import InputError
-from loco_drake.gaits import LABELS, GaitLabel
-from loco_drake.motion import FPS, Motion, load_motion, save_motion
+from loco_drake.motion.gaits import LABELS, GaitLabel
+from loco_drake.motion.motion import FPS, Motion, load_motion, save_motion
 
 SECONDS = 2.0
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from loco_drake.common.rotations import quat_rotate
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.retargeting.scaling import Targets
-from loco_drake.rotations import quat_rotate
 
 Array = NDArray[np.float64]
 

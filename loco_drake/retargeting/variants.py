@@ -14,8 +14,8 @@ with it. The clearance of a swing and the limits of the joints are the robot's.
 from dataclasses import dataclass, replace
 from math import sqrt
 
-from loco_drake.keypoints import KeypointClip
-from loco_drake.retargeting.config import RetargetConfig
+from loco_drake.motion.keypoints import KeypointClip
+from loco_drake.retargeting.source_config import RetargetConfig
 
 
 @dataclass(frozen=True)

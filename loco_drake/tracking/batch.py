@@ -3,16 +3,16 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.rotations import quat_to_matrix
+from loco_drake.control.action import joint_targets
+from loco_drake.control.domain import Domain
+from loco_drake.control.fall import has_fallen
+from loco_drake.control.measurement import draw_error, measure
+from loco_drake.control.observation import LOOK_AHEAD, Preview, observe
+from loco_drake.control.plan import PLAN_DT, Plan
+from loco_drake.control.reward import reward_terms
 from loco_drake.models.robots import get_robot
-from loco_drake.rotations import quat_to_matrix
-from loco_drake.systems.domain import Domain
-from loco_drake.systems.fall import has_fallen
-from loco_drake.systems.joint_targets import joint_targets
-from loco_drake.systems.observation import LOOK_AHEAD, Preview, observe
-from loco_drake.systems.plan import PLAN_DT, Plan
-from loco_drake.systems.sensors import draw_error, measure
-from loco_drake.systems.tracking_reward import reward_terms
-from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.environment_config import EnvironmentConfig
 from loco_drake.tracking.physics import make_worlds
 from loco_drake.tracking.terminations import has_strayed
 

@@ -7,9 +7,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from loco_drake.common.weights import load_weights, save_weights
 from loco_drake.tracking.ppo import AdaptivePPO
 from loco_drake.tracking.sampler import PlanSampler
-from loco_drake.weights import load_weights, save_weights
 
 KIND = "tracker checkpoint"
 

@@ -6,11 +6,11 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.systems.observation import OBSERVATION_SIZE
-from loco_drake.systems.plan import Plan
-from loco_drake.systems.tracking_reward import REWARD_TERMS
+from loco_drake.control.observation import OBSERVATION_SIZE
+from loco_drake.control.plan import Plan
+from loco_drake.control.reward import REWARD_TERMS
 from loco_drake.tracking.batch import TrackingBatch
-from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.environment_config import EnvironmentConfig
 
 Observation = NDArray[np.float32]
 
@@ -23,9 +23,9 @@ ACTION_SPACE = gymnasium.spaces.Box(-10.0, 10.0, (12,), np.float32)
 class TrackingEnv(gymnasium.Env[Observation, Observation]):
     """A robot that is to follow a plan, drawn at random for each episode.
 
-    Observations are those of :mod:`loco_drake.systems.observation`, actions those of
+    Observations are those of :mod:`loco_drake.control.observation`, actions those of
     :class:`loco_drake.systems.joint_targets.JointTargets`, rewards the sum of
-    :func:`loco_drake.systems.tracking_reward.reward_terms`, at most 1 a step, less
+    :func:`loco_drake.control.reward.reward_terms`, at most 1 a step, less
     what the configuration's ``homing`` and ``fall_cost`` take, by default nothing. An
     episode starts in a state of the plan (reference state initialization, Peng et al.
     2018), terminates when the robot falls or loses its plan, and is truncated when its

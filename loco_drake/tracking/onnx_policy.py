@@ -8,13 +8,13 @@ from typing import Any
 import torch
 
 from loco_drake import __version__
+from loco_drake.common.errors import InputError
+from loco_drake.common.files import atomic_path
+from loco_drake.control.actor import PRIVILEGED, Actor
+from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.datasets.registry import DATASETS
-from loco_drake.errors import InputError
-from loco_drake.files import atomic_path
-from loco_drake.gaits import parse_label
 from loco_drake.models.robots import Robot
-from loco_drake.systems.actor import PRIVILEGED, Actor
-from loco_drake.systems.observation import OBSERVATION_SIZE
+from loco_drake.motion.gaits import parse_label
 
 SET_POINTS = (
     "every 1 / rate s: q_d = q + (kd v + tau) / kp + action_scale * action, v_d = 0; "
@@ -28,7 +28,7 @@ def policy_metadata(actor: Actor, robot: Robot) -> dict[str, str]:
 
     - kind, robot, labels; rate in Hz
     - observation_layout: names and sizes of the parts of the observation, in order;
-      :mod:`loco_drake.systems.observation` says what they are; ignored_parts: those
+      :mod:`loco_drake.control.observation` says what they are; ignored_parts: those
       that make no difference to this policy
     - joint_names in the order of the action; standing_joints (rad), which joint
       positions are observed from; kp (Nm/rad) and kd (Nm s/rad) of the joints' PD

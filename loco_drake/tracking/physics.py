@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Diagram
 
+from loco_drake.control.domain import Domain
+from loco_drake.control.plan import PLAN_DT
 from loco_drake.models.plant import ConfigureSimulator, PlantConfig
 from loco_drake.systems.diagram import MakeLocomotionDiagram
-from loco_drake.systems.domain import Domain, SetDomain
-from loco_drake.systems.plan import PLAN_DT
+from loco_drake.systems.domain import SetDomain
 from loco_drake.systems.scenario import Disturbances, ExternalTargets, Scenario
-from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.environment_config import EnvironmentConfig
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
 
-from loco_drake.systems.actor import OBSERVATION_CLIP, Actor, ActorConfig
-from loco_drake.systems.symmetry import mirror_observations
+from loco_drake.control.actor import OBSERVATION_CLIP, Actor, ActorConfig
+from loco_drake.control.symmetry import mirror_observations
 from loco_drake.tracking.symmetric_policy import (
     Mirror,
     SymmetricPolicy,

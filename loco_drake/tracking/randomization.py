@@ -5,13 +5,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
+from loco_drake.control.domain import Domain, Push, SensorErrors
+from loco_drake.control.measurement import error_vector
+from loco_drake.control.plan import PLAN_DT
 from loco_drake.models.robots import Robot
 from loco_drake.systems.actuation import MAX_LATENCY
-from loco_drake.systems.domain import Domain, Push, SensorErrors
-from loco_drake.systems.plan import PLAN_DT
 from loco_drake.systems.scenario import Disturbances
-from loco_drake.systems.sensors import error_vector
 
 Array = NDArray[np.float64]
 

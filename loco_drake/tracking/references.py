@@ -3,14 +3,14 @@
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from loco_drake.errors import InputError
-from loco_drake.gaits import parse_label
+from loco_drake.common.errors import InputError
+from loco_drake.control.plan import Plan, plan_from_motion
+from loco_drake.control.retiming import path_limits
 from loco_drake.generation.generate import generate_motions
-from loco_drake.generation.pretrained import pretrained_motion_model
+from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import Robot
-from loco_drake.motion import Motion, load_motion
-from loco_drake.systems.plan import Plan, plan_from_motion
-from loco_drake.systems.retiming import path_limits
+from loco_drake.motion.gaits import parse_label
+from loco_drake.motion.motion import Motion, load_motion
 from loco_drake.systems.toppra_smoother import smooth_plan
 
 

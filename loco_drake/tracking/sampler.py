@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.gaits import LABELS
-from loco_drake.systems.plan import Plan
+from loco_drake.control.plan import Plan
+from loco_drake.motion.gaits import LABELS
 
 _MEMORY = 0.98  # weight of the past in a label's score, per episode
 _PLAN_MEMORY = 0.6  # the same of a plan's score: it is drawn seldom

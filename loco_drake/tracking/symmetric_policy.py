@@ -11,8 +11,8 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from torch import Tensor
 
-from loco_drake.systems.actor import unprivileged_mask
-from loco_drake.systems.symmetry import mirror_actions, mirror_observations
+from loco_drake.control.actor import unprivileged_mask
+from loco_drake.control.symmetry import mirror_actions, mirror_observations
 
 # What the mirror image of the robot observes, of arrays and of tensors.
 Mirror = Callable[[Any], Any]

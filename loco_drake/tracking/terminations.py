@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 
 
 @dataclass(kw_only=True)

@@ -13,18 +13,18 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from torch import Tensor
 
-from loco_drake.errors import InputError
-from loco_drake.gaits import LABELS
-from loco_drake.systems.actor import ActorConfig, save_actor
-from loco_drake.systems.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
-from loco_drake.systems.plan import Plan
+from loco_drake.common.errors import InputError
+from loco_drake.control.actor import ActorConfig, save_actor
+from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
+from loco_drake.control.plan import Plan
+from loco_drake.motion.gaits import LABELS
 from loco_drake.tracking.checkpoint import (
     load_checkpoint,
     restore,
     save_checkpoint,
     start_from,
 )
-from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.environment_config import EnvironmentConfig
 from loco_drake.tracking.learning_curve import PROGRESS, learning_curve
 from loco_drake.tracking.ppo import AdaptivePPO, PpoConfig, export_actor, make_ppo
 from loco_drake.tracking.sampler import PlanSampler

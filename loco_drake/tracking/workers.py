@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from loco_drake.systems.plan import Plan
+from loco_drake.control.plan import Plan
 from loco_drake.tracking.batch import TrackingBatch
-from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
+from loco_drake.tracking.environment_config import EnvironmentConfig
 from loco_drake.tracking.sampler import PlanSampler
 
 # This share of the episodes that fell or lost their plan is followed by another try,

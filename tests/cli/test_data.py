@@ -4,7 +4,7 @@ import pytest
 import tyro
 
 from loco_drake.cli.data import DataInspect, DataList
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from tests.synthetic_horse import make_horse, write_raw_recording
 from tests.synthetic_robots import write_mpc_recording, write_solo8_recording
 

@@ -9,13 +9,13 @@ import pytest
 from loco_drake.cli.evaluate_generation import EvaluateGeneration
 from loco_drake.cli.evaluate_tokenizer import EvaluateTokenizer
 from loco_drake.cli.train_classifier import TrainClassifier
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.evaluation.classifier import load_classifier
 from loco_drake.evaluation.recorded import retarget_recordings
 from loco_drake.generation.generator import save_generator
 from loco_drake.generation.tokenizer import save_tokenizer
 from loco_drake.models.robots import get_robot
-from loco_drake.motion import save_motion
+from loco_drake.motion.motion import save_motion
 from tests.synthetic import write_dog_recording
 from tests.synthetic_motion import synthetic_motion
 from tests.tiny_model import make_tiny_model

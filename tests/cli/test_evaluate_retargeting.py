@@ -4,7 +4,7 @@ import pytest
 import tyro
 
 from loco_drake.cli.evaluate_retargeting import EvaluateRetargeting
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from tests.robot_files import SOLO8
 
 KEYS = {

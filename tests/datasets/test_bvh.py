@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.bvh import read_bvh
 from loco_drake.datasets.dog import read_dog
-from loco_drake.errors import InputError
 from tests.synthetic_bvh import write_dog_bvh
 
 ARM = """HIERARCHY

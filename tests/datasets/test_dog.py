@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.dog import read_dog
-from loco_drake.errors import InputError
 from tests.spoil import spoil
 from tests.synthetic import write_dog_recording
 

@@ -5,9 +5,9 @@ import socket
 
 import pytest
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.download import download_files, is_present, parse_mirror
 from loco_drake.datasets.manifest import RemoteFile
-from loco_drake.errors import InputError
 from tests.mirror_server import serve
 
 NAMES = (

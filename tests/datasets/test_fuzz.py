@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.registry import DATASETS, read_clip
-from loco_drake.errors import InputError
 from tests.spoil import spoil
 from tests.synthetic import write_dog_recording
 from tests.synthetic_bvh import write_dog_bvh

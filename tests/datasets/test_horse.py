@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.horse import read_horse
 from loco_drake.datasets.segments import read_segments
-from loco_drake.errors import InputError
 from tests.synthetic_horse import (
     GAITS,
     make_horse,

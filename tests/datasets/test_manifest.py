@@ -5,7 +5,7 @@ from collections import Counter
 from loco_drake.datasets.manifest import MANIFEST, files_by_source, read_manifest
 from loco_drake.datasets.registry import DATASETS
 from loco_drake.datasets.segment_table import SHIPPED, read_rows
-from loco_drake.gaits import LABELS
+from loco_drake.motion.gaits import LABELS
 
 
 def test_shipped_manifest_names_each_file_once_with_commit_and_checksum():

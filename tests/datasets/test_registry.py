@@ -2,9 +2,9 @@ from pathlib import Path
 
 import pytest
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.registry import DATASETS, data_dir, get_dataset, read_clip
-from loco_drake.errors import InputError
-from loco_drake.gaits import SOURCES
+from loco_drake.motion.gaits import SOURCES
 from tests.synthetic import write_dog_recording
 
 

@@ -1,8 +1,8 @@
 import pytest
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets import segment_table
 from loco_drake.datasets.segment_table import add_shipped_rows, read_rows, write_rows
-from loco_drake.errors import InputError
 
 
 def row(file, gait="trot", start=0, **more):

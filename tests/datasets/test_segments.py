@@ -2,13 +2,13 @@ from pathlib import Path
 
 import pytest
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.segments import (
     Segment,
     one_format,
     read_segments,
     select_segments,
 )
-from loco_drake.errors import InputError
 
 HEADER = "dataset,file,gait,start_frame,end_frame,fps,mean_speed_mps,notes\n"
 

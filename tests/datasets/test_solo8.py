@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.segments import read_segments
 from loco_drake.datasets.solo8 import read_solo8
-from loco_drake.errors import InputError
 from tests.synthetic_robots import DROP_FRAMES, write_solo8_recording
 
 

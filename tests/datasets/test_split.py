@@ -4,7 +4,7 @@ import pytest
 
 from loco_drake.datasets.segments import Segment, one_format, read_segments
 from loco_drake.datasets.split import SHARE, TRAIN, VALIDATION, Split
-from loco_drake.gaits import LABELS
+from loco_drake.motion.gaits import LABELS
 
 
 def segment(file, gait="trot", source="dog", seconds=2.0):

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
+from loco_drake.common.weights import save_weights
 from loco_drake.evaluation.classifier import (
     ClassifierConfig,
     embeddings,
@@ -12,10 +13,9 @@ from loco_drake.evaluation.classifier import (
 from loco_drake.evaluation.recognition import LinearRecognizer, TransformerRecognizer
 from loco_drake.evaluation.samples import make_samples
 from loco_drake.evaluation.train_classifier import class_indices, train_classifier
-from loco_drake.gaits import LABELS, parse_label
 from loco_drake.generation.training import LoopSettings
 from loco_drake.models.robots import get_robot
-from loco_drake.weights import save_weights
+from loco_drake.motion.gaits import LABELS, parse_label
 from tests.varied_motion import varied_motions
 
 GO2 = get_robot("go2")

@@ -5,7 +5,7 @@ import pytest
 
 from loco_drake.evaluation.drift import RESOLUTION, beyond_recorded, drift, worst
 from loco_drake.models.robots import get_robot
-from loco_drake.motion import Motion, make_motion
+from loco_drake.motion.motion import Motion, make_motion
 from tests.synthetic_motion import synthetic_motion
 
 GO2 = get_robot("go2")

@@ -9,8 +9,8 @@ from loco_drake.evaluation.gait_change import (
     peaks,
     roughness,
 )
-from loco_drake.gait_schedule import parse_schedule
 from loco_drake.models.robots import get_robot
+from loco_drake.motion.gait_schedule import parse_schedule
 from tests.synthetic_motion import synthetic_motion
 
 GO2 = get_robot("go2")

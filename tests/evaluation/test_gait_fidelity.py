@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from loco_drake.evaluation.gait_fidelity import NO_RHYTHM, gait_fidelity, timing_errors
-from loco_drake.gait_timing import (
+from loco_drake.models.robots import get_robot
+from loco_drake.motion.gait_timing import (
     GaitTiming,
     Track,
     clip_track,
     gait_timing,
     motion_track,
 )
-from loco_drake.keypoints import KeypointClip
-from loco_drake.models.robots import get_robot
+from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.retargeting.retarget import retarget_clip
 from tests.synthetic import STANCE_HEIGHT, make_dog
 

@@ -11,7 +11,7 @@ from loco_drake.evaluation.motion_scores import (
     overall,
 )
 from loco_drake.models.robots import get_robot
-from loco_drake.motion_quality import (
+from loco_drake.motion.quality import (
     penetration_max,
     stance_slip_median,
     toe_trajectories,

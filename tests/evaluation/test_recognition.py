@@ -9,8 +9,8 @@ from loco_drake.evaluation.recognition import (
     recognize,
 )
 from loco_drake.evaluation.samples import join, make_samples
-from loco_drake.gaits import parse_label
 from loco_drake.models.robots import get_robot
+from loco_drake.motion.gaits import parse_label
 from tests.varied_motion import varied_motions
 
 GO2 = get_robot("go2")

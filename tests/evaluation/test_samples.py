@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from loco_drake.common.rotations import quat_multiply, quat_rotate, yaw_quat
 from loco_drake.evaluation.samples import (
     FRAMES,
     SUMMARY,
@@ -14,9 +15,8 @@ from loco_drake.evaluation.samples import (
     subject_of,
     summarize,
 )
-from loco_drake.gaits import parse_label
 from loco_drake.models.robots import get_robot
-from loco_drake.rotations import quat_multiply, quat_rotate, yaw_quat
+from loco_drake.motion.gaits import parse_label
 from tests.synthetic_motion import synthetic_motion
 
 GO2 = get_robot("go2")

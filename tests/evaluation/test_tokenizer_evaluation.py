@@ -6,13 +6,13 @@ import torch
 
 from loco_drake.evaluation.recorded import by_split
 from loco_drake.evaluation.tokenizer import evaluate_tokenizer
-from loco_drake.generation.library import motion_clip
 from loco_drake.generation.tokenizer_score import (
     clip_tensor,
     code_counts,
     codebook_use,
     score_tokenizer,
 )
+from loco_drake.generation.training_motions import motion_clip
 from tests.tiny_model import make_tiny_model
 from tests.varied_motion import varied_motions
 

@@ -3,8 +3,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.segments import Segment, read_segments
-from loco_drake.errors import InputError
 from loco_drake.evaluation.tracking_table import (
     Episode,
     Trial,

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from loco_drake.control.actor import load_actor
 from loco_drake.models.robots import get_robot
-from loco_drake.systems.actor import load_actor
 from tests.process import run_python
 from tests.synthetic import write_dog_recording
 

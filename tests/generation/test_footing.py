@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
+from loco_drake.common.rotations import quat_rotate
 from loco_drake.generation import features as ft
 from loco_drake.generation.footing import start_footing, step_footing
 from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import get_robot
-from loco_drake.rotations import quat_rotate
 
 GO2 = get_robot("go2")
 ORIGIN = np.zeros((1, 3))

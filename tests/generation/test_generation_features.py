@@ -31,7 +31,7 @@ def test_round_trip_gives_back_every_pose(make_synthetic, turn):
 def test_features_do_not_depend_on_place_and_heading(make_synthetic):
     from dataclasses import replace
 
-    from loco_drake.rotations import quat_multiply, quat_rotate, yaw_quat
+    from loco_drake.common.rotations import quat_multiply, quat_rotate, yaw_quat
 
     motion = make_synthetic("dog-pace", 2.0, 0.7, 0.4)
     q_turn, shift = yaw_quat(np.array(2.1)), np.array([3.0, -1.0, 0.0])
@@ -74,9 +74,9 @@ def test_motion_of_another_robot_is_refused(make_synthetic):
 def test_toes_in_torch_agree_with_numpy_kinematics(make_synthetic):
     import torch
 
+    from loco_drake.common.rotations import quat_rotate
     from loco_drake.generation.toes import Toes
     from loco_drake.models.kinematics import toe_positions
-    from loco_drake.rotations import quat_rotate
 
     motion = make_synthetic("dog-pace", 1.0, 0.7, 0.0)
     features = ft.motion_features(GO2, motion)

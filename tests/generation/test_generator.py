@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.generation.generator import (
     DURATION_BINS,
     Generator,
@@ -13,7 +13,7 @@ from loco_drake.generation.generator import (
     save_generator,
 )
 from loco_drake.generation.layers import turn_channels
-from loco_drake.generation.pace import BINS
+from loco_drake.generation.speed_rank import BINS
 
 TINY = GeneratorConfig(
     tokenizer="0" * 16,
@@ -171,7 +171,7 @@ def test_saved_weights_come_back(generator, tmp_path):
 
 
 def test_weights_of_something_else_are_refused(generator, tmp_path):
-    from loco_drake.weights import save_weights
+    from loco_drake.common.weights import save_weights
 
     path = tmp_path / "g.safetensors"
     save_weights(path, "tokenizer", generator.state_dict(), {})

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.errors import InputError
-from loco_drake.gait_schedule import parse_schedule
-from loco_drake.gaits import LABELS, parse_label
+from loco_drake.common.errors import InputError
+from loco_drake.common.rotations import quat_error, quat_rotate
 from loco_drake.generation.generate import (
     SEVERAL,
     generate_motion,
@@ -19,7 +18,8 @@ from loco_drake.generation.tokenizer import (
 )
 from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import get_robot
-from loco_drake.rotations import quat_error, quat_rotate
+from loco_drake.motion.gait_schedule import parse_schedule
+from loco_drake.motion.gaits import LABELS, parse_label
 from tests.tiny_model import make_tiny_model
 
 PACE, TROT = parse_label("dog-pace"), parse_label("dog-trot")

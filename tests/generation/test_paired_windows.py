@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.gaits import parse_label
 from loco_drake.generation import features as ft
-from loco_drake.generation.library import motion_clip
+from loco_drake.generation.training_motions import motion_clip
 from loco_drake.generation.windows import EXACT, WINDOW, PairedWindows
+from loco_drake.motion.gaits import parse_label
 from tests.synthetic_motion import synthetic_motion
 
 ROBOTS = ("a1", "go2")

@@ -7,18 +7,16 @@ import pytest
 import torch
 
 from loco_drake.cli.generate import Generate
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.evaluation.gait_change import forward_speed, roughness
-from loco_drake.gait_schedule import parse_schedule
-from loco_drake.gaits import parse_label
 from loco_drake.generation.generate import generate_motions
-from loco_drake.generation.pretrained import (
-    pretrained_motion_model,
-    pretrained_path,
-)
+from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import ROBOTS, get_robot
-from loco_drake.motion import load_motion
-from loco_drake.motion_quality import (
+from loco_drake.models.shipped import pretrained_path
+from loco_drake.motion.gait_schedule import parse_schedule
+from loco_drake.motion.gaits import parse_label
+from loco_drake.motion.motion import load_motion
+from loco_drake.motion.quality import (
     joint_speed_ratio_max,
     penetration_max,
     stance_slip_median,
@@ -155,9 +153,9 @@ def test_a_pace_is_a_trot_by_its_legs_a_second_after_the_change():
 THREADS = """
 import hashlib, numpy as np, torch
 from loco_drake.evaluation.gait_change import forward_speed, roughness
-from loco_drake.gait_schedule import parse_schedule
-from loco_drake.gaits import parse_label
-from loco_drake.generation.pretrained import pretrained_motion_model
+from loco_drake.motion.gait_schedule import parse_schedule
+from loco_drake.motion.gaits import parse_label
+from loco_drake.generation.motion_model import pretrained_motion_model
 torch.set_num_threads({threads})
 model = pretrained_motion_model("go2")
 stream = model.start(np.array([7]), 10.0)

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from loco_drake.errors import InputError
-from loco_drake.gaits import parse_label
+from loco_drake.common.errors import InputError
 from loco_drake.generation import features as ft
-from loco_drake.generation.library import Clip
 from loco_drake.generation.stitching import BLEND, SHORTEST_STAY, Stitcher
+from loco_drake.generation.training_motions import Clip
 from loco_drake.models.robots import get_robot
+from loco_drake.motion.gaits import parse_label
 
 GO2 = get_robot("go2")
 TROT = parse_label("dog-trot")

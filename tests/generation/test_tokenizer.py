@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.generation.features import CONTACTS, SIZE
 from loco_drake.generation.tokenizer import (
     Tokenizer,
@@ -144,7 +144,7 @@ def test_damaged_weights_are_refused(tokenizer, tmp_path):
 
 
 def test_weights_of_another_size_are_refused(tokenizer, tmp_path):
-    from loco_drake.weights import save_weights
+    from loco_drake.common.weights import save_weights
 
     path = tmp_path / "t.safetensors"
     network = {"robots": ["go2"], "width": 24}

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.errors import InputError
-from loco_drake.gaits import parse_label
+from loco_drake.common.errors import InputError
 from loco_drake.generation.features import SIZE
 from loco_drake.generation.generator import (
     GeneratorConfig,
     duration_bin,
     load_generator,
 )
-from loco_drake.generation.library import Clip, load_library
 from loco_drake.generation.motion_model import MotionModel
-from loco_drake.generation.pace import BINS, speed_edges
+from loco_drake.generation.speed_rank import BINS, speed_edges
 from loco_drake.generation.tokenizer import TokenizerConfig, load_tokenizer
 from loco_drake.generation.tokenizer_score import score_tokenizer
 from loco_drake.generation.train_generator import (
@@ -32,6 +30,8 @@ from loco_drake.generation.train_tokenizer import (
     train_tokenizer,
 )
 from loco_drake.generation.training import LoopSettings
+from loco_drake.generation.training_motions import Clip, load_library
+from loco_drake.motion.gaits import parse_label
 
 TINY = TokenizerConfig(width=24, depth=1, frame_width=8, books=2, book_size=16)
 

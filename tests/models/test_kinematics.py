@@ -5,13 +5,13 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
 
 from loco_drake.models.kinematics import leg_joints, toe_jacobians, toe_positions
-from loco_drake.models.robots import ROBOTS, AddRobotModel, get_robot
-from loco_drake.motion import (
+from loco_drake.models.legs import (
     MIRROR_JOINT_SIGNS,
     MIRROR_JOINTS,
     MIRROR_LEGS,
     MIRROR_POLAR,
 )
+from loco_drake.models.robots import ROBOTS, AddRobotModel, get_robot
 
 LEGS = ("FL", "FR", "RL", "RR")
 

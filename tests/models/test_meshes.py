@@ -6,7 +6,7 @@ import trimesh
 from pydrake.geometry import MeshcatVisualizer, Role, StartMeshcat
 from pydrake.systems.framework import DiagramBuilder
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.models import meshes
 from loco_drake.models.meshes import convert_meshes
 from loco_drake.models.plant import AddRobotPlant, PlantConfig

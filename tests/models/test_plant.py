@@ -11,7 +11,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
+from loco_drake.common.rotations import yaw_of
 from loco_drake.models.plant import (
     CONTACTS,
     AddRobotPlant,
@@ -20,7 +21,6 @@ from loco_drake.models.plant import (
 )
 from loco_drake.models.robots import ROBOTS, AddRobotModel, get_robot
 from loco_drake.models.trot import AddTrotSource
-from loco_drake.rotations import yaw_of
 
 
 def build(name, config, q_d):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.models.meshes import vendor_folder
 from loco_drake.models.robot_files import is_robot_file, load_robot
 from loco_drake.models.robots import get_robot

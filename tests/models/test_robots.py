@@ -3,7 +3,7 @@ import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.models.robots import ROBOTS, AddRobotModel, ConfigureParser, get_robot
 
 NAMES = [

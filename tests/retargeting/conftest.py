@@ -3,7 +3,7 @@
 import pytest
 
 from loco_drake.models.robots import get_robot
-from loco_drake.motion import FPS
+from loco_drake.motion.motion import FPS
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 
 

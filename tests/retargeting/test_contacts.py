@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from loco_drake.intervals import intervals
-from loco_drake.keypoints import KeypointClip
-from loco_drake.retargeting.config import ContactConfig, load_config
+from loco_drake.common.runs import intervals
+from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.retargeting.contacts import (
     detect_contacts,
     resample_contacts,
 )
+from loco_drake.retargeting.source_config import ContactConfig, load_config
 from tests.synthetic import FPS, STANCE_HEIGHT, make_dog
 
 

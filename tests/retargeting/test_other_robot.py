@@ -10,15 +10,15 @@ import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from loco_drake.keypoints import KeypointClip
+from loco_drake.common.rotations import yaw_of
 from loco_drake.models.robot_files import load_robot
-from loco_drake.motion import FPS
-from loco_drake.motion_quality import stance_slip_median
-from loco_drake.retargeting.config import load_config
+from loco_drake.motion.keypoints import KeypointClip
+from loco_drake.motion.motion import FPS
+from loco_drake.motion.quality import stance_slip_median
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import retarget_clip
+from loco_drake.retargeting.source_config import load_config
 from loco_drake.retargeting.variants import Variant
-from loco_drake.rotations import yaw_of
 from tests.robot_files import FOREIGN, SOLO8, write_robot
 from tests.synthetic import GAITS, STANCE_HEIGHT, make_dog
 

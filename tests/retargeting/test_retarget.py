@@ -1,17 +1,17 @@
 import numpy as np
 import pytest
 
-from loco_drake import motion_quality as quality
+from loco_drake.common.errors import InputError
+from loco_drake.common.rotations import yaw_of
 from loco_drake.datasets.dog import read_dog
 from loco_drake.datasets.segments import read_segments, select_segments
-from loco_drake.errors import InputError
-from loco_drake.keypoints import KeypointClip
-from loco_drake.motion import FPS
-from loco_drake.retargeting.config import load_config
+from loco_drake.motion import quality
+from loco_drake.motion.keypoints import KeypointClip
+from loco_drake.motion.motion import FPS
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import retarget_clip, within_reach
 from loco_drake.retargeting.scaling import Targets
-from loco_drake.rotations import yaw_of
+from loco_drake.retargeting.source_config import load_config
 from tests.synthetic import GAITS, STANCE_HEIGHT, make_dog, write_dog_recording
 
 

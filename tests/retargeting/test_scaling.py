@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from loco_drake.errors import InputError
-from loco_drake.keypoints import KeypointClip
+from loco_drake.common.errors import InputError
 from loco_drake.models.robots import get_robot
-from loco_drake.retargeting.config import RetargetConfig
+from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.retargeting.scaling import resample, scale_to_robot, stance_height
+from loco_drake.retargeting.source_config import RetargetConfig
 
 
 def clip_of(withers, hip, toes, fps=50.0):

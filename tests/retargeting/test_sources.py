@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
+from loco_drake.common.runs import intervals
 from loco_drake.datasets.registry import read_clip
 from loco_drake.datasets.segments import read_segments
-from loco_drake.gaits import LABELS
-from loco_drake.intervals import intervals
-from loco_drake.motion import FPS
-from loco_drake.retargeting.config import load_config
+from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.motion import FPS
 from loco_drake.retargeting.contacts import detect_contacts
 from loco_drake.retargeting.inspection import summarize
 from loco_drake.retargeting.retarget import retarget_clip
 from loco_drake.retargeting.scaling import stance_height
+from loco_drake.retargeting.source_config import load_config
 from tests.retargeting.test_retarget import assert_good
 from tests.synthetic_horse import GAITS, make_horse, write_world_recording
 from tests.synthetic_robots import (

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from loco_drake.models.kinematics import leg_joints
-from loco_drake.motion import FPS
+from loco_drake.motion.motion import FPS
 from loco_drake.retargeting.retarget import within_reach
 from loco_drake.retargeting.scaling import Targets
 from loco_drake.retargeting.trunk import (

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from loco_drake.evaluation.gait_fidelity import gait_fidelity
-from loco_drake.gait_timing import clip_track, motion_track
-from loco_drake.gaits import LABELS
-from loco_drake.keypoints import KeypointClip
 from loco_drake.models.robots import get_robot
-from loco_drake.motion import FPS
-from loco_drake.retargeting.config import RetargetConfig, load_config
+from loco_drake.motion.gait_timing import clip_track, motion_track
+from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.keypoints import KeypointClip
+from loco_drake.motion.motion import FPS
 from loco_drake.retargeting.contacts import detect_contacts
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import retarget_clip
+from loco_drake.retargeting.source_config import RetargetConfig, load_config
 from loco_drake.retargeting.variants import Variant, in_time, smoothing_in_time
 from tests.synthetic import GAITS, STANCE_HEIGHT, make_dog
 from tests.synthetic_horse import make_horse

@@ -2,8 +2,8 @@
 
 import pytest
 
+from loco_drake.control.plan import Plan, plan_from_motion
 from loco_drake.models.robots import Robot, get_robot
-from loco_drake.systems.plan import Plan, plan_from_motion
 from tests.synthetic_motion import synthetic_motion
 
 

@@ -8,11 +8,12 @@ from pydrake.multibody.tree import PdControllerGains
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from loco_drake.control.domain import Domain, Push, SensorErrors
+from loco_drake.control.plan import PLAN_DT
 from loco_drake.models.plant import CONTACTS, ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import AddRobotModel
 from loco_drake.systems.diagram import MakeLocomotionDiagram
-from loco_drake.systems.domain import Domain, Push, SensorErrors, SetDomain
-from loco_drake.systems.plan import PLAN_DT
+from loco_drake.systems.domain import SetDomain
 from loco_drake.systems.scenario import (
     Disturbances,
     ExternalAction,

@@ -2,10 +2,11 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from loco_drake.control.action import ACTION_SCALE
+from loco_drake.control.feed_forward import feed_forward_torques
+from loco_drake.control.plan import PLAN_DT
 from loco_drake.models.robots import get_robot
-from loco_drake.systems.feed_forward import feed_forward_torques
-from loco_drake.systems.joint_targets import ACTION_SCALE, JointTargets
-from loco_drake.systems.plan import PLAN_DT
+from loco_drake.systems.joint_targets import JointTargets
 from loco_drake.systems.plan_player import PlanPlayer
 
 

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from loco_drake.gaits import GAITS, SOURCES
-from loco_drake.systems.observation import (
+from loco_drake.control.observation import (
     LOOK_AHEAD,
     OBSERVATION_LAYOUT,
     OBSERVATION_SIZE,
@@ -11,7 +10,8 @@ from loco_drake.systems.observation import (
     observe,
     preview,
 )
-from loco_drake.systems.plan import PLAN_DT, make_plan
+from loco_drake.control.plan import PLAN_DT, make_plan
+from loco_drake.motion.gaits import GAITS, SOURCES
 
 TIME = 30 * PLAN_DT
 

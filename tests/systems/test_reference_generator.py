@@ -3,10 +3,10 @@ import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from loco_drake.errors import InputError
-from loco_drake.gaits import parse_label
-from loco_drake.rotations import quat_error
-from loco_drake.systems.plan import PLAN_DT
+from loco_drake.common.errors import InputError
+from loco_drake.common.rotations import quat_error
+from loco_drake.control.plan import PLAN_DT
+from loco_drake.motion.gaits import parse_label
 from loco_drake.systems.reference_generator import ReferenceGenerator
 from loco_drake.systems.scenario import GeneratedReference
 from loco_drake.systems.toppra_smoother import ToppraSmoother

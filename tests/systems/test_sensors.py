@@ -2,17 +2,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from loco_drake.models.robots import get_robot
-from loco_drake.systems.domain import Domain, SensorErrors
-from loco_drake.systems.observation import OBSERVATION_LAYOUT, observe, preview
-from loco_drake.systems.sensors import (
+from loco_drake.control.domain import Domain, SensorErrors
+from loco_drake.control.measurement import (
     ERROR_LAYOUT,
     ERROR_SIZE,
-    Sensors,
     draw_error,
     error_vector,
     measure,
 )
+from loco_drake.control.observation import OBSERVATION_LAYOUT, observe, preview
+from loco_drake.models.robots import get_robot
+from loco_drake.systems.sensors import Sensors
 
 SIZES = {
     "orientation": 0.1,

@@ -3,9 +3,9 @@ import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from loco_drake.systems.plan import PLAN_DT
+from loco_drake.control.plan import PLAN_DT
+from loco_drake.control.retiming import PathLimits, path_limits
 from loco_drake.systems.plan_player import PlanPlayer
-from loco_drake.systems.retiming import PathLimits, path_limits
 from loco_drake.systems.toppra_smoother import ToppraSmoother, smooth_plan
 
 

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.errors import InputError
-from loco_drake.models.robots import get_robot
-from loco_drake.systems.actor import (
+from loco_drake.common.errors import InputError
+from loco_drake.common.weights import load_weights, save_weights
+from loco_drake.control.actor import (
     Actor,
     ActorConfig,
     load_actor,
     save_actor,
 )
-from loco_drake.systems.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
-from loco_drake.systems.symmetry import mirror_actions, mirror_observations
+from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
+from loco_drake.control.symmetry import mirror_actions, mirror_observations
+from loco_drake.models.robots import get_robot
 from loco_drake.systems.tracking_policy import TrackingPolicy
-from loco_drake.weights import load_weights, save_weights
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from loco_drake.systems.tracking_reward import reward_terms
+from loco_drake.control.reward import reward_terms
 
 JOINTS, JOINT_VELOCITIES, TOES, POSE, VELOCITY = range(5)
 

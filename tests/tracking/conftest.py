@@ -2,8 +2,8 @@
 
 import pytest
 
+from loco_drake.control.plan import Plan
 from loco_drake.models.robots import get_robot
-from loco_drake.systems.plan import Plan
 from loco_drake.tracking.references import smooth_motions
 from tests.synthetic_motion import synthetic_motion
 

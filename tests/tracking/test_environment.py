@@ -5,18 +5,18 @@ from gymnasium.utils.env_checker import check_env
 from pydrake.systems.analysis import Simulator
 from scipy.spatial.transform import Rotation
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
+from loco_drake.common.rotations import yaw_of
+from loco_drake.control.plan import PLAN_DT
+from loco_drake.control.reward import REWARD_TERMS
 from loco_drake.models.plant import ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import get_robot
-from loco_drake.motion import save_motion
-from loco_drake.rotations import yaw_of
+from loco_drake.motion.motion import save_motion
 from loco_drake.systems.diagram import MakeLocomotionDiagram, PlaceOnPlan
-from loco_drake.systems.plan import PLAN_DT
 from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
-from loco_drake.systems.tracking_reward import REWARD_TERMS
 from loco_drake.tracking.batch import TrackingBatch
-from loco_drake.tracking.config import EnvironmentConfig, ResetNoise
 from loco_drake.tracking.environment import TrackingEnv
+from loco_drake.tracking.environment_config import EnvironmentConfig, ResetNoise
 from loco_drake.tracking.references import load_references
 from loco_drake.tracking.registration import make_tracking
 from loco_drake.tracking.terminations import TerminationConfig

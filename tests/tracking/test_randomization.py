@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
+from loco_drake.control.observation import OBSERVATION_LAYOUT
+from loco_drake.control.plan import PLAN_DT
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.domain import SetDomain
-from loco_drake.systems.observation import OBSERVATION_LAYOUT
-from loco_drake.systems.plan import PLAN_DT
 from loco_drake.systems.scenario import (
     Disturbances,
     ExternalAction,
@@ -17,8 +17,8 @@ from loco_drake.systems.scenario import (
     Scenario,
 )
 from loco_drake.tracking.batch import TrackingBatch
-from loco_drake.tracking.config import EnvironmentConfig, ResetNoise
 from loco_drake.tracking.environment import TrackingEnv
+from loco_drake.tracking.environment_config import EnvironmentConfig, ResetNoise
 from loco_drake.tracking.randomization import (
     BIAS,
     PUSH_DURATION,

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.errors import InputError
-from loco_drake.gaits import parse_label
+from loco_drake.common.errors import InputError
+from loco_drake.common.weights import save_weights
+from loco_drake.control.actor import load_actor
+from loco_drake.control.observation import OBSERVATION_SIZE
+from loco_drake.control.symmetry import mirror_actions, mirror_observations
 from loco_drake.models.robots import get_robot
-from loco_drake.systems.actor import load_actor
-from loco_drake.systems.observation import OBSERVATION_SIZE
-from loco_drake.systems.symmetry import mirror_actions, mirror_observations
+from loco_drake.motion.gaits import parse_label
 from loco_drake.tracking.checkpoint import load_checkpoint
-from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.environment_config import EnvironmentConfig
 from loco_drake.tracking.ppo import PpoConfig
 from loco_drake.tracking.randomization import STANDARD
 from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.train import TrainingConfig, train_tracker
 from loco_drake.tracking.workers import WorkerVecEnv
-from loco_drake.weights import save_weights
 
 TROT, PACE = parse_label("dog-trot").index, parse_label("dog-pace").index
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from loco_drake.errors import check_choice
+from loco_drake.common.errors import check_choice
 from loco_drake.evaluation.report.page import render
 from loco_drake.evaluation.report.replays import (
     Replay,
@@ -13,11 +13,11 @@ from loco_drake.evaluation.report.replays import (
 )
 from loco_drake.evaluation.report.results import load_results
 from loco_drake.evaluation.report.scoreboard import counts, scoreboard
-from loco_drake.gaits import GaitLabel, parse_label
 from loco_drake.generation.generate import generate_motion
-from loco_drake.generation.pretrained import pretrained_motion_model
+from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import ROBOTS
-from loco_drake.motion import Motion
+from loco_drake.motion.gaits import GaitLabel, parse_label
+from loco_drake.motion.motion import Motion
 
 STRIP_SECONDS = 1.0  # of motion for an outline; a little more than is shown
 DEFAULT_REPLAYS = ("dog-trot", "horse-trot", "mpc-bound", "solo8-walk")

@@ -1,15 +1,14 @@
 """What the shipped networks are, read from their weights."""
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
+from loco_drake.common.weights import load_weights
+from loco_drake.control.actor import load_actor
 from loco_drake.evaluation.report.published import SIZES
 from loco_drake.evaluation.report.tables import Cell, Row, Table
 from loco_drake.evaluation.report.words import robot_title
-from loco_drake.generation.pretrained import pretrained_path
 from loco_drake.models.robots import ROBOTS, get_robot
-from loco_drake.motion import FPS
-from loco_drake.systems.actor import load_actor
-from loco_drake.systems.pretrained import policy_path
-from loco_drake.weights import load_weights
+from loco_drake.models.shipped import policy_path, pretrained_path
+from loco_drake.motion.motion import FPS
 
 
 def networks_table() -> Table:

@@ -15,7 +15,7 @@ from loco_drake.evaluation.report.results import Results
 from loco_drake.evaluation.report.scoreboard import Line
 from loco_drake.evaluation.report.words import robot_title
 from loco_drake.models.robots import ROBOTS
-from loco_drake.motion import Motion
+from loco_drake.motion.motion import Motion
 
 
 def render(

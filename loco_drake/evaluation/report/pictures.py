@@ -18,9 +18,9 @@ from loco_drake.evaluation.report.svg import (
     to_svg,
 )
 from loco_drake.evaluation.report.words import robot_title
-from loco_drake.gaits import LABELS, SOURCES
 from loco_drake.models.robots import get_robot
-from loco_drake.motion import Motion
+from loco_drake.motion.gaits import LABELS, SOURCES
+from loco_drake.motion.motion import Motion
 
 Array = NDArray[np.float64]
 

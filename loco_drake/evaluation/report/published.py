@@ -7,7 +7,7 @@ on those with the definitions of this project. What is not here is not published
 
 from dataclasses import dataclass
 
-from loco_drake.evaluation.intervals import Estimate, wilson
+from loco_drake.evaluation.confidence import Estimate, wilson
 
 SOURCES = {
     "all": "All",

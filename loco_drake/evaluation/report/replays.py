@@ -11,14 +11,14 @@ from typing import Any
 
 from pydrake.geometry import Meshcat, MeshcatAnimation
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
+from loco_drake.control.actor import load_actor
 from loco_drake.evaluation.replay import FRAMES_PER_SECOND, dress, frame
 from loco_drake.evaluation.rollout import Recorder
 from loco_drake.evaluation.tracking import tracking_metrics
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS, get_robot
-from loco_drake.systems.actor import load_actor
-from loco_drake.systems.pretrained import policy_path
+from loco_drake.models.shipped import policy_path
 from loco_drake.systems.scenario import GeneratedReference, Scenario, TrainedPolicy
 
 _AGAIN = 10_000  # times that a replay is repeated

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.evaluation.report.expected import EXPECTED, ResultFile
 from loco_drake.models.robots import ROBOTS
-from loco_drake.systems.pretrained import pretrained_dir
+from loco_drake.models.shipped import pretrained_dir
 
 
 def results_dir() -> Path:

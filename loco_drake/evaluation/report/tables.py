@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from loco_drake.evaluation.report.results import Figures
-from loco_drake.gaits import LABELS
+from loco_drake.motion.gaits import LABELS
 
 NOTHING = "–"
 NOT_MEASURED = "not measured"  # of what others released

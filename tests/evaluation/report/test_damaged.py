@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.evaluation.report.page import drawings, tables
 from loco_drake.evaluation.report.results import load_results, results_dir
 from loco_drake.evaluation.report.scoreboard import scoreboard

@@ -2,7 +2,7 @@
 
 import pytest
 
-from loco_drake.errors import InputError
+from loco_drake.common.errors import InputError
 from loco_drake.evaluation.report.expected import EXPECTED
 from loco_drake.evaluation.report.results import load_results
 from loco_drake.evaluation.report.scoreboard import scoreboard

@@ -1,0 +1,1 @@
+"""What training computes without a diagram: plan, observation, action, reward."""

@@ -1,0 +1,115 @@
+"""What the policy sees: the robot's state and the plan relative to it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.common.rotations import (
+    heading_matrix,
+    quat_conjugate,
+    quat_log,
+    quat_multiply,
+    quat_to_matrix,
+)
+from loco_drake.control.plan import Plan
+from loco_drake.models.robots import Robot
+from loco_drake.motion.gaits import ONE_HOT, ONE_HOT_SIZE
+
+Array = NDArray[np.float64]
+
+# Samples of the plan after the present one that are shown to the policy.
+LOOK_AHEAD = np.array([1, 2, 4, 8])
+_K = len(LOOK_AHEAD)
+
+# Name and size of each part, in order; weights of a policy record this layout. H is
+# the base's heading frame: at the base, z up, x along the base's x in the plane.
+OBSERVATION_LAYOUT = (
+    ("gravity_B", 3),  # direction of gravity
+    ("w_WB_B", 3),  # rad/s
+    ("v_WB_H", 3),  # m/s
+    ("height", 1),  # z of the base, m
+    ("joint_positions", 12),  # from the standing pose, rad
+    ("joint_velocities", 12),  # a tenth of rad/s
+    ("last_action", 12),
+    ("plan_joint_velocities", 12),  # of the next sample, a tenth of rad/s
+    ("plan_joints", 12 * _K),  # plan minus robot, rad
+    ("plan_p_H", 3 * _K),  # base position of the plan from the robot's, m
+    ("plan_R_B", 3 * _K),  # base rotation of the plan from the robot's, so(3), rad
+    ("plan_v_H", 3 * _K),  # base velocity of the plan, m/s
+    ("plan_w_H", 3 * _K),  # base angular velocity of the plan, rad/s
+    ("plan_contacts", 4 * _K),
+    ("label", ONE_HOT_SIZE),  # one-hot of the source, one-hot of the gait
+)
+OBSERVATION_SIZE = sum(size for _, size in OBSERVATION_LAYOUT)
+
+
+@dataclass(frozen=True)
+class Preview:
+    """What the policy is shown of its plan; any leading shape, K samples ahead.
+
+    Attributes:
+        q: positions as in :class:`Plan`, shape (..., K, 19).
+        v: velocities as in :class:`Plan`, shape (..., K, 18).
+        contacts: shape (..., K, 4).
+        label: index into :data:`loco_drake.motion.gaits.LABELS` of the present,
+            shape (...).
+    """
+
+    q: Array
+    v: Array
+    contacts: NDArray[np.bool_]
+    label: NDArray[np.int64]
+
+
+def preview(plan: Plan, time: float) -> Preview:
+    """Returns what is to be shown of ``plan`` at a context time in s."""
+    now = plan.index(time)
+    k = np.minimum(now + LOOK_AHEAD, len(plan) - 1)
+    return Preview(plan.q[k], plan.v[k], plan.contacts[k], plan.labels[now])
+
+
+def observe(
+    robot: Robot,
+    ahead: Preview,
+    state: Array,
+    action: Array,
+    R_WB: Array | None = None,
+) -> Array:
+    """Returns observations, shape (..., OBSERVATION_SIZE).
+
+    Args:
+        robot: the robot.
+        ahead: what it is to do.
+        state: the plant's [q, v], as in :class:`Plan`, shape (..., 37).
+        action: the action being applied, shape (..., 12).
+        R_WB: the base's rotation matrix (..., 3, 3), if it is known already.
+    """
+    q, v = state[..., :19], state[..., 19:]
+    if R_WB is None:
+        R_WB = quat_to_matrix(q[..., :4])
+    R_WH = heading_matrix(R_WB)
+    parts = (
+        -R_WB[..., 2, :],
+        _times(v[..., :3], R_WB),
+        _times(v[..., 3:6], R_WH),
+        q[..., 6:7],
+        q[..., 7:] - robot.stand_joints,
+        0.1 * v[..., 6:],
+        action,
+        0.1 * ahead.v[..., 0, 6:],
+        ahead.q[..., 7:] - q[..., None, 7:],
+        (ahead.q[..., 4:7] - q[..., None, 4:7]) @ R_WH,
+        quat_log(quat_multiply(quat_conjugate(q[..., None, :4]), ahead.q[..., :4])),
+        ahead.v[..., 3:6] @ R_WH,
+        ahead.v[..., :3] @ R_WH,
+        ahead.contacts,
+        ONE_HOT[ahead.label],
+    )
+    shape = state.shape[:-1]
+    return np.concatenate([part.reshape(*shape, -1) for part in parts], axis=-1)
+
+
+def _times(rows: Array, R: Array) -> Array:
+    """Returns row vectors (..., 3) times matrices (..., 3, 3)."""
+    return (rows[..., None, :] @ R)[..., 0, :]

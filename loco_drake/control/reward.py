@@ -1,0 +1,65 @@
+"""How well the robot does what the plan says, one number a step."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.common.rotations import heading_matrix, quat_error, quat_to_matrix
+from loco_drake.models.kinematics import toe_positions
+from loco_drake.models.robots import Robot
+
+Array = NDArray[np.float64]
+
+# Name, weight, and what is scaled in the exponent: Peng et al. 2020, "Learning agile
+# robotic locomotion skills by imitating animals", Section IV-B.
+REWARD_TERMS = ("joints", "joint_velocities", "toes", "base_pose", "base_velocity")
+REWARD_WEIGHTS = np.array([0.5, 0.05, 0.2, 0.15, 0.1])
+
+
+def reward_terms(
+    robot: Robot,
+    plan_state: Array,
+    plan_p_BoF_H: Array,
+    state: Array,
+    R_WB: Array | None = None,
+) -> Array:
+    """Returns the five terms of the reward, weighted, (..., 5); their sum is at most 1.
+
+    With e the sum of squared errors, in rad, m and s:
+
+    - joints: .5 exp(-5 e)
+    - joint velocities: .05 exp(-.1 e)
+    - toes: .2 exp(-40 e), sphere centres relative to the base, each in the heading
+      frame of its own base
+    - base pose: .15 exp(-20 e_p - 10 e_R), p_WB in the world, the rotation in so(3)
+    - base velocity: .1 exp(-2 e_v - .2 e_w), in the world
+
+    Args:
+        robot: the robot.
+        plan_state: what the plan wants, [q, v] as in :class:`Plan`, shape (..., 37).
+        plan_p_BoF_H: the plan's toes, as :attr:`Plan.p_BoF_H`, shape (..., 4, 3).
+        state: the plant's [q, v], shape (..., 37).
+        R_WB: the base's rotation matrix (..., 3, 3), if it is known already.
+    """
+    q, v = state[..., :19], state[..., 19:]
+    if R_WB is None:
+        R_WB = quat_to_matrix(q[..., :4])
+    p_BoF_H = toe_positions(robot, q[..., 7:]) @ (
+        np.swapaxes(R_WB, -1, -2) @ heading_matrix(R_WB)
+    )
+    gap = q[..., 4:] - plan_state[..., 4:19]
+    turn = quat_error(q[..., :4], plan_state[..., :4])
+    velocity = v - plan_state[..., 19:]
+    toes = p_BoF_H - plan_p_BoF_H
+    exponents = (
+        5 * _squares(gap[..., 3:]),
+        0.1 * _squares(velocity[..., 6:]),
+        40 * _squares(toes.reshape(*toes.shape[:-2], 12)),
+        20 * _squares(gap[..., :3]) + 10 * _squares(turn),
+        2 * _squares(velocity[..., 3:6]) + 0.2 * _squares(velocity[..., :3]),
+    )
+    return REWARD_WEIGHTS * np.exp(-np.stack(exponents, axis=-1))
+
+
+def _squares(error: Array) -> Array:
+    """Returns the sum of squares over the last axis."""
+    return np.einsum("...i,...i->...", error, error)

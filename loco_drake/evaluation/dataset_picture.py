@@ -1,0 +1,160 @@
+"""The library of motion in one picture: how much there is, and how it differs.
+
+The paper's Figure 2 shows the distribution of its library; this shows that of any
+folder of Motion files.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from loco_drake.datasets.split import TRAIN, VALIDATION
+from loco_drake.generation.features import SIZE, motion_features
+from loco_drake.models.robots import get_robot
+from loco_drake.motion.gait_timing import gait_timing, motion_track
+from loco_drake.motion.gaits import GAITS, LABELS, SOURCES, GaitLabel
+from loco_drake.motion.motion import Motion
+from loco_drake.retargeting.trajectories import trajectories
+
+Array = NDArray[np.float64]
+
+# A colour for each source, a marker for each gait.
+_TABLEAU = ("tab:blue", "tab:orange", "tab:green", "tab:red")
+COLORS = dict(zip(SOURCES, _TABLEAU, strict=True))
+MARKERS = dict(zip(GAITS, "so^v<>DP", strict=True))
+
+_STRIDES = 2  # Solo8's clips hold few
+
+
+@dataclass(frozen=True)
+class MotionPoint:
+    """What the picture shows of one motion.
+
+    Attributes:
+        label: what it does.
+        side: of the split.
+        seconds: its length.
+        speed: mean horizontal speed of the trunk in m/s.
+        stride_period: s, None with less than two strides.
+        duty_factor: mean of the feet, None with less than two strides.
+        embedding: mean and standard deviation of each feature
+            (:mod:`loco_drake.generation.features`) in every 2 s, shape (N, 44).
+    """
+
+    label: GaitLabel
+    side: str
+    seconds: float
+    speed: float
+    stride_period: float | None
+    duty_factor: float | None
+    embedding: Array
+
+
+def describe(motion: Motion) -> MotionPoint:
+    """Returns what the picture shows of a motion of at least two frames."""
+    robot = get_robot(motion.robot)
+    timing = gait_timing(motion_track(motion, robot), _STRIDES)
+    features = [motion_features(robot, cut) for cut in trajectories(motion)]
+    rows = [np.concatenate((f.mean(axis=0), f.std(axis=0))) for f in features]
+    velocity = motion.base_velocity[:, :2]
+    return MotionPoint(
+        label=motion.label,
+        side=motion.provenance.get("split", TRAIN),
+        seconds=motion.duration,
+        speed=float(np.hypot(velocity[:, 0], velocity[:, 1]).mean()),
+        stride_period=timing.stride_period if timing else None,
+        duty_factor=float(timing.duty_factors.mean()) if timing else None,
+        embedding=np.array(rows).reshape(len(rows), 2 * SIZE),
+    )
+
+
+def principal_components(rows: Array, count: int = 2) -> tuple[Array, Array]:
+    """Returns the projections of rows (N, D) on their first principal components.
+
+    Columns are first divided by their standard deviation.
+
+    Returns:
+        Projections, shape (N, ``count``), and the share of the variance of each.
+    """
+    deviation = rows.std(axis=0)
+    scaled = (rows - rows.mean(axis=0)) / np.where(deviation > 0, deviation, 1.0)
+    left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
+    share = singular**2 / (singular**2).sum()
+    return left[:, :count] * singular[:count], share[:count]
+
+
+def library_figure(points: Iterable[MotionPoint], title: str) -> Figure:
+    """Returns a figure of four parts: seconds, rhythm, duty factor, an embedding.
+
+    Colours stand for sources, markers for gaits; what is for validation is hollow.
+
+    Args:
+        points: of motions with one of the fifteen labels.
+        title: above all.
+    """
+    points = list(points)
+    figure = Figure(figsize=(12, 9), layout="constrained")
+    figure.suptitle(title)
+    seconds, rhythm, duty, embedding = figure.subplots(2, 2).flat
+    _draw_seconds(seconds, points)
+    strides = [p for p in points if p.stride_period is not None]
+    for axes, key, name in (
+        (rhythm, "stride_period", "stride period [s]"),
+        (duty, "duty_factor", "duty factor"),
+    ):
+        for point in strides:
+            _mark(axes, point, np.array([[point.speed, getattr(point, key)]]))
+        axes.set(xlabel="speed [m/s]", ylabel=name)
+    with_rows = [p for p in points if len(p.embedding)]
+    counts = [len(p.embedding) for p in with_rows]
+    if sum(counts) > 2:
+        rows = np.concatenate([p.embedding for p in with_rows])
+        projected, share = principal_components(rows)
+        parts = np.split(projected, np.cumsum(counts)[:-1])
+        for point, part in zip(with_rows, parts, strict=True):
+            _mark(embedding, point, part)
+        embedding.set(
+            xlabel=f"first principal component, {share[0]:.0%}",
+            ylabel=f"second, {share[1]:.0%}",
+            title="features of every 2 s",
+        )
+    handles = [
+        rhythm.scatter([], [], color=COLORS[label.source], marker=MARKERS[label.gait])
+        for label in LABELS
+    ]
+    rhythm.legend(handles, [str(label) for label in LABELS], fontsize=8, ncols=2)
+    return figure
+
+
+def _draw_seconds(axes: Axes, points: list[MotionPoint]) -> None:
+    """Draws a bar for each label: its seconds, those for validation hollow."""
+    left = np.zeros(len(LABELS))
+    rows = range(len(LABELS), 0, -1)
+    colors = [COLORS[label.source] for label in LABELS]
+    for side in (TRAIN, VALIDATION):
+        own = np.zeros(len(LABELS))
+        for point in points:
+            if point.side == side:
+                own[point.label.index] += point.seconds
+        face = colors if side == TRAIN else "none"
+        axes.barh(rows, own, left=left, facecolor=face, edgecolor=colors)
+        left += own
+    axes.set_yticks(rows, [str(label) for label in LABELS])
+    axes.set(xlabel="seconds; hollow: for validation")
+
+
+def _mark(axes: Axes, point: MotionPoint, xy: Array) -> None:
+    color = COLORS[point.label.source]
+    axes.scatter(
+        xy[:, 0],
+        xy[:, 1],
+        marker=MARKERS[point.label.gait],
+        facecolor=color if point.side == TRAIN else "none",
+        edgecolor=color,
+        s=22,
+        linewidth=0.8,
+    )

@@ -1,0 +1,68 @@
+"""How fast a gait is done: as a rank among how fast it is done in the recordings.
+
+A generator that is only told the gait wanders through all speeds at which it was
+recorded. Told the rank of the speed too, it keeps to it; and a rank makes sense for
+any gait, 0 the slowest that was recorded, 1 the fastest.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from loco_drake.common.determinism import uniforms
+from loco_drake.generation.features import VELOCITY
+from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.motion import FPS
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+BINS = 16
+SMOOTHING = 2.0  # s over which speed is averaged
+_DICE = 2**62  # where the dice for the pace lie; chunks count up from 0
+
+
+def token_speeds(features: Array, frames_per_token: int) -> Array:
+    """Returns the speed along the heading around each token, (T / f,).
+
+    In stand heights per second, as the features (T, SIZE) are.
+    """
+    frames = len(features) // frames_per_token * frames_per_token
+    forward = features[:frames, VELOCITY.start]
+    smooth = uniform_filter1d(forward, round(SMOOTHING * FPS), mode="nearest")
+    return np.asarray(smooth.reshape(-1, frames_per_token).mean(axis=1))
+
+
+def speed_edges(speeds: Iterable[tuple[int, Array]]) -> Array:
+    """Returns the speeds between the bins of each label, (labels, BINS - 1).
+
+    A bin holds as much motion of its label as any other.
+
+    Args:
+        speeds: label and :func:`token_speeds` of all clips.
+    """
+    by_label: dict[int, list[Array]] = {}
+    for label, of_clip in speeds:
+        by_label.setdefault(label, []).append(of_clip)
+    edges = np.zeros((len(LABELS), BINS - 1))
+    for label, clips in by_label.items():
+        shares = np.arange(1, BINS) / BINS
+        edges[label] = np.quantile(np.concatenate(clips), shares)
+    return edges
+
+
+def speed_bin(edges: Array, label: int, speeds: Array) -> Integers:
+    """Returns the bin of speeds of a label, given :func:`speed_edges`."""
+    return np.searchsorted(edges[label], speeds)
+
+
+def rank_bin(rank: Array) -> Integers:
+    """Returns the bin of ranks in [0, 1]."""
+    return np.minimum(np.asarray(rank) * BINS, BINS - 1).astype(np.int64)
+
+
+def drawn_rank(seeds: Integers) -> Array:
+    """Returns the rank in [0, 1) that goes with each seed, (B,)."""
+    return np.array([uniforms(int(seed), _DICE, (1,))[0] for seed in seeds])

@@ -1,0 +1,1 @@
+"""Motion of animals and robots: keypoints, gaits, rhythm, files and their quality."""

@@ -1,0 +1,79 @@
+"""Which gait is done when: one all the time, or several one after the other."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.common.errors import InputError
+from loco_drake.motion.gaits import GaitLabel, parse_label
+
+SYNTAX = "such as dog-pace,dog-trot@3,dog-gallop@6"
+
+
+@dataclass(frozen=True)
+class GaitSchedule:
+    """Gaits one after the other; written ``dog-pace,dog-trot@3,dog-gallop@6``.
+
+    Attributes:
+        labels: the gaits, in the order in which they are done.
+        starts: when each begins, in s; the first is 0, later ones are later.
+    """
+
+    labels: tuple[GaitLabel, ...]
+    starts: tuple[float, ...] = (0.0,)
+
+    def __str__(self) -> str:
+        later = zip(self.labels[1:], self.starts[1:], strict=True)
+        return ",".join([str(self.labels[0]), *(f"{k}@{t:g}" for k, t in later)])
+
+    def at(self, times: Sequence[float] | NDArray[np.float64]) -> NDArray[np.int64]:
+        """Returns the index into LABELS at each of ``times`` (N,), in s from 0 on."""
+        place = np.searchsorted(self.starts, np.asarray(times), side="right") - 1
+        return np.array([label.index for label in self.labels])[place]
+
+    def check_ends_by(self, duration: float) -> None:
+        """Raises InputError if a gait begins only when ``duration`` s are over."""
+        if self.starts[-1] >= duration:
+            raise InputError(
+                f"{self.labels[-1]} is to begin at {self.starts[-1]:g} s, but changes "
+                f"of gait must come before the end, at {duration:g} s."
+            )
+
+
+def parse_schedule(text: str) -> GaitSchedule:
+    """Returns the schedule written as ``text``: a gait label, or several with times.
+
+    Raises:
+        InputError: if a label is unknown, or a time is missing, not a number, or not
+            later than the one before.
+    """
+    first, *later = text.split(",")
+    labels, starts = [parse_label(first)], [0.0]
+    for part in later:
+        name, _, time = part.partition("@")
+        labels.append(parse_label(name))
+        starts.append(_seconds(part, time))
+    for earlier, start in pairwise(starts):
+        if start <= earlier:
+            raise InputError(
+                f"Gaits must begin one after the other, at rising times above 0 s, "
+                f"{SYNTAX}, not at {start:g} s after {earlier:g} s."
+            )
+    return GaitSchedule(tuple(labels), tuple(starts))
+
+
+def _seconds(part: str, time: str) -> float:
+    try:
+        seconds = float(time)
+    except ValueError:
+        seconds = float("nan")
+    if not isfinite(seconds):
+        raise InputError(
+            f"Each gait but the first needs the time in s at which it begins, "
+            f"{SYNTAX}, which {part!r} lacks."
+        )
+    return seconds

@@ -1,0 +1,190 @@
+"""Rhythm of a gait, from the geometry of trunk and toes alone.
+
+The same definitions hold for an animal's keypoints and for a robot's kinematics; all
+are unchanged where every length is scaled by one factor. With x the fore-aft position
+of a toe ahead of the trunk, along the trunk's heading:
+
+Stride period
+    The lag T of the first high peak of the correlation between the four x(t) and the
+    four x(t + T), up to half of the clip, refined by a parabola through the peak and
+    its neighbours. It is told only of a clip that is three such strides long (fewer
+    where that is asked for).
+Phase lag
+    How far a toe's cycle is behind that of RL, as a share of the stride, 0 to 1: the
+    difference of the phases of the fundamentals of their x(t), which are fitted by
+    least squares together with two harmonics and a straight line.
+Duty factor
+    The share of whole strides in which a toe is down: from one frame to the next its
+    sole is lower than 6 % of the stance height in both and moves, over the ground, at
+    less than half of the trunk's mean speed (or half a stance height per second, where
+    that is more). So a toe that hovers or skates along with the trunk is never down.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.common.rotations import yaw_of
+from loco_drake.models.legs import LEGS
+from loco_drake.models.quadruped import Quadruped
+from loco_drake.motion.keypoints import KeypointClip
+from loco_drake.motion.motion import Motion
+from loco_drake.motion.quality import toe_trajectories
+
+Array = NDArray[np.float64]
+
+REFERENCE_LEG = LEGS.index("RL")
+MIN_STRIDES = 3
+
+# A peak counts as high from this share of the highest on; noise can raise the one at
+# two strides above the first. Below the second value a clip has no rhythm.
+_HIGH_PEAK = 0.85
+_LOWEST_PEAK = 0.5
+_HARMONICS = 3
+_DOWN_HEIGHT = 0.06  # stance heights
+_DOWN_SPEED_RATIO = 0.5
+_DOWN_SPEED = 0.5  # stance heights per second
+
+
+@dataclass(frozen=True)
+class Track:
+    """Trunk and soles over time, of an animal or a robot.
+
+    Attributes:
+        fps: frames per second.
+        trunk: horizontal position of the trunk's middle in m, shape (T, 2).
+        yaw: heading of the trunk in rad, shape (T,).
+        soles: lowest points of the toes in m, ground at z = 0, shape (T, 4, 3).
+        stance_height: of the animal or robot in m, the unit of length.
+    """
+
+    fps: float
+    trunk: Array
+    yaw: Array
+    soles: Array
+    stance_height: float
+
+    @property
+    def fore_aft(self) -> Array:
+        """Position of each toe ahead of the trunk, along its heading, m, (T, 4)."""
+        offset = self.soles[..., :2] - self.trunk[:, None]
+        ahead = np.stack((np.cos(self.yaw), np.sin(self.yaw)), axis=-1)
+        along: Array = np.einsum("tlk,tk->tl", offset, ahead)
+        return along
+
+
+@dataclass(frozen=True)
+class GaitTiming:
+    """The rhythm of a clip; definitions above.
+
+    Attributes:
+        stride_period: s.
+        phase_lags: behind RL, as shares of the stride within [0, 1), shape (4,).
+        duty_factors: shape (4,).
+    """
+
+    stride_period: float
+    phase_lags: Array
+    duty_factors: Array
+
+
+def clip_track(clip: KeypointClip, stance_height: float) -> Track:
+    """Returns the track of an animal: its trunk lies between withers and hip.
+
+    Args:
+        clip: ground at z = 0.
+        stance_height: what is scaled to the robot's, m.
+    """
+    spine = clip.withers - clip.hip
+    middle = (clip.withers + clip.hip) / 2
+    return Track(
+        fps=clip.fps,
+        trunk=middle[:, :2],
+        yaw=np.arctan2(spine[:, 1], spine[:, 0]),
+        soles=clip.toes,
+        stance_height=stance_height,
+    )
+
+
+def motion_track(motion: Motion, robot: Quadruped) -> Track:
+    """Returns the track of a robot's motion, by its kinematics."""
+    soles = toe_trajectories(motion, robot) - [0.0, 0.0, robot.foot_radius]
+    return Track(
+        fps=motion.fps,
+        trunk=motion.base_position[:, :2],
+        yaw=yaw_of(motion.base_quaternion),
+        soles=soles,
+        stance_height=robot.stand_height,
+    )
+
+
+def gait_timing(track: Track, strides: int = MIN_STRIDES) -> GaitTiming | None:
+    """Returns the rhythm of a track, None if it holds fewer than ``strides``."""
+    period = stride_period(track, strides)
+    if period is None:
+        return None
+    return GaitTiming(period, phase_lags(track, period), duty_factors(track, period))
+
+
+def stride_period(track: Track, strides: int = MIN_STRIDES) -> float | None:
+    """Returns the stride period in s, None without ``strides`` of one rhythm."""
+    signals = track.fore_aft
+    lags = (len(signals) - 1) // 2
+    correlation = np.array([_correlation(signals, lag) for lag in range(lags + 2)])
+    inner = correlation[1:-1]
+    peaks = 1 + np.flatnonzero((inner > correlation[:-2]) & (inner >= correlation[2:]))
+    if not len(peaks) or correlation[peaks].max() < _LOWEST_PEAK:
+        return None
+    high = correlation[peaks] >= _HIGH_PEAK * correlation[peaks].max()
+    peak = int(peaks[high][0])
+    before, top, after = correlation[peak - 1 : peak + 2]
+    vertex = (before - after) / (2 * (before - 2 * top + after))
+    period = float(peak + vertex)
+    # A hair's grace for a clip of just as many strides.
+    enough = len(signals) - 1 >= strides * period - 0.5
+    return period / track.fps if enough else None
+
+
+def phase_lags(track: Track, period: float) -> Array:
+    """Returns each toe's lag behind RL as a share of the stride, shape (4,)."""
+    time = np.arange(len(track.soles)) / track.fps
+    angles = 2 * np.pi * np.outer(time / period, np.arange(1, _HARMONICS + 1))
+    line = np.stack((np.ones_like(time), time / time[-1]), axis=-1)
+    basis = np.concatenate((np.cos(angles), np.sin(angles), line), axis=-1)
+    fit, *_ = np.linalg.lstsq(basis, track.fore_aft)
+    phase = np.arctan2(fit[_HARMONICS], fit[0]) / (2 * np.pi)
+    lags: Array = (phase - phase[REFERENCE_LEG]) % 1.0
+    return lags
+
+
+def duty_factors(track: Track, period: float) -> Array:
+    """Returns the share of whole strides in which each toe is down, shape (4,)."""
+    speed = _speed(track.soles[..., :2], track.fps)
+    trunk_speed = float(_speed(track.trunk, track.fps).mean())
+    slow = speed < max(
+        _DOWN_SPEED_RATIO * trunk_speed, _DOWN_SPEED * track.stance_height
+    )
+    low = track.soles[..., 2] < _DOWN_HEIGHT * track.stance_height
+    down = low[:-1] & low[1:] & slow
+    strides = int(len(down) / track.fps / period)
+    factors: Array = down[: round(strides * period * track.fps)].mean(axis=0)
+    return factors
+
+
+def _speed(points: Array, fps: float) -> Array:
+    """Returns the speeds between frames, (T - 1, ...), of points (T, ..., 2)."""
+    steps = np.diff(points, axis=0) * fps
+    speed: Array = np.hypot(steps[..., 0], steps[..., 1])
+    return speed
+
+
+def _correlation(signals: Array, lag: int) -> float:
+    """Returns the correlation of (T, N) with itself ``lag`` frames later, all N pooled.
+
+    Means are those of the frames that overlap, so that it is 1 for a periodic signal.
+    """
+    a, b = signals[: len(signals) - lag], signals[lag:]
+    a, b = a - a.mean(axis=0), b - b.mean(axis=0)
+    norm = float(np.sqrt((a * a).sum() * (b * b).sum()))
+    return float((a * b).sum()) / norm if norm > 0 else 0.0

@@ -1,0 +1,74 @@
+"""Motion of any four-legged source as six points in space."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.common.errors import InputError, check_choice
+from loco_drake.models.legs import MIRROR_LEGS, MIRROR_POLAR
+from loco_drake.motion.gaits import SOURCES
+
+
+@dataclass(frozen=True)
+class KeypointClip:
+    """Withers, hip and four toes over time, in metres, Z up, X forward.
+
+    The ground is the plane z = 0 and the clip starts heading along +x. These are what
+    :mod:`loco_drake.retargeting` needs of an animal or robot and all that it gets.
+
+    Attributes:
+        source: one of :data:`loco_drake.motion.gaits.SOURCES`.
+        gait: name of the gait; need not be one of the fifteen labels.
+        fps: frames per second of the arrays, the source's own rate.
+        withers: position of the withers, shape (T, 3).
+        hip: position of the hip (top of the pelvis), shape (T, 3).
+        toes: positions of the toes, shape (T, 4, 3), legs FL, FR, RL, RR.
+        provenance: where the frames come from, as text (file, frames, licence, ...).
+    """
+
+    source: str
+    gait: str
+    fps: float
+    withers: NDArray[np.float64]
+    hip: NDArray[np.float64]
+    toes: NDArray[np.float64]
+    provenance: dict[str, str]
+
+    def __post_init__(self) -> None:
+        check_choice("source", self.source, SOURCES)
+        if not (np.isfinite(self.fps) and self.fps > 0):
+            raise InputError(
+                f"A keypoint clip needs a rate above 0 frames/s, not {self.fps}."
+            )
+        frames = len(self.withers)
+        shapes = {"withers": (frames, 3), "hip": (frames, 3), "toes": (frames, 4, 3)}
+        for name, shape in shapes.items():
+            value = getattr(self, name)
+            if value.shape != shape:
+                raise InputError(
+                    f"The {name} of a keypoint clip must have shape {shape}, "
+                    f"not {value.shape}."
+                )
+            if not np.isfinite(value).all():
+                raise InputError(f"The {name} of a keypoint clip hold NaN or infinity.")
+
+    def __len__(self) -> int:
+        return len(self.withers)
+
+    def mirrored(self) -> "KeypointClip":
+        """Returns the clip reflected in the plane y = 0 (left for right)."""
+        return replace(
+            self,
+            withers=self.withers * MIRROR_POLAR,
+            hip=self.hip * MIRROR_POLAR,
+            toes=self.toes[:, MIRROR_LEGS] * MIRROR_POLAR,
+            provenance=mirrored_provenance(self.provenance),
+        )
+
+
+def mirrored_provenance(provenance: dict[str, str]) -> dict[str, str]:
+    """Returns the provenance of the mirror image; a mirror's mirror is the original."""
+    if "mirrored" in provenance:
+        return {key: text for key, text in provenance.items() if key != "mirrored"}
+    return {**provenance, "mirrored": "left-right"}

@@ -1,0 +1,82 @@
+"""How good a motion is, from its geometry alone: one definition for each number.
+
+Every figure is computed from joint angles and trunk poses by the robot's kinematics,
+never from contact labels, so that it means the same for a motion from anywhere.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.common.rotations import quat_rotate
+from loco_drake.models.quadruped import Quadruped
+from loco_drake.motion.motion import Motion
+
+Array = NDArray[np.float64]
+
+# A toe sphere whose lowest point is this near to the ground stands on it, m.
+STANCE_HEIGHT = 0.010
+# Rounding of the files and the solver is no violation of a limit, rad.
+_LIMIT_TOLERANCE = 1e-6
+
+
+def toe_trajectories(motion: Motion, robot: Quadruped) -> Array:
+    """Returns the centres of the toe spheres p_WF in m, shape (T, 4, 3)."""
+    p_BF = robot.toe_positions(motion.joint_positions)
+    p_WF: Array = motion.base_position[:, None] + quat_rotate(
+        motion.base_quaternion[:, None], p_BF
+    )
+    return p_WF
+
+
+def stance_slip_speeds(p_WF: Array, foot_radius: float, fps: float) -> Array:
+    """Returns the horizontal speed in m/s of each toe in each step of its stance.
+
+    A toe is in stance where the lowest point of its sphere is within 10 mm of the
+    ground in two consecutive frames (sunk deeper counts too); the speed is that between
+    the two.
+
+    Args:
+        p_WF: centres of the toe spheres in m, shape (T, 4, 3).
+        foot_radius: m.
+        fps: frames per second.
+
+    Returns:
+        One speed for each pair of frames and toe in stance, shape (N,).
+    """
+    low = p_WF[..., 2] - foot_radius <= STANCE_HEIGHT
+    stance = low[1:] & low[:-1]
+    steps = np.diff(p_WF[..., :2], axis=0)
+    speeds: Array = np.hypot(steps[..., 0], steps[..., 1])[stance] * fps
+    return speeds
+
+
+def stance_slip_median(p_WF: Array, foot_radius: float, fps: float) -> float | None:
+    """Returns the median of :func:`stance_slip_speeds`, None without any stance."""
+    speeds = stance_slip_speeds(p_WF, foot_radius, fps)
+    return float(np.median(speeds)) if len(speeds) else None
+
+
+def penetration_max(p_WF: Array, foot_radius: float) -> float:
+    """Returns how deep the lowest point of any toe sphere sinks, in m, at least 0."""
+    return float(max(0.0, foot_radius - p_WF[..., 2].min()))
+
+
+def joint_limit_violations(joints: Array, robot: Quadruped) -> int:
+    """Returns how many angles of ``joints`` (T, J) lie outside the position limits."""
+    below = joints < robot.joint_lower - _LIMIT_TOLERANCE
+    above = joints > robot.joint_upper + _LIMIT_TOLERANCE
+    return int((below | above).sum())
+
+
+def joint_speed_ratio_max(joints: Array, robot: Quadruped, fps: float) -> float:
+    """Returns the highest joint speed over its limit: 1 is just allowed.
+
+    Speeds are those between consecutive frames of ``joints`` (T, J).
+    """
+    speeds = np.abs(np.diff(joints, axis=0)) * fps
+    return float((speeds / robot.joint_speed_limits).max())
+
+
+def distance_rmse(a: Array, b: Array) -> float:
+    """Returns the root of the mean squared Euclidean distance of points (..., 3)."""
+    return float(np.sqrt(((a - b) ** 2).sum(axis=-1).mean()))

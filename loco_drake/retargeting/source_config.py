@@ -1,0 +1,115 @@
+"""What retargeting needs to know of an animal: one short YAML file for each."""
+
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from pydrake.common.yaml import yaml_load_typed
+
+from loco_drake.common.errors import InputError, check_choice
+
+_FOLDER = Path(__file__).parent / "sources"
+
+
+# Not frozen: yaml_load_typed sets the fields one by one.
+@dataclass(kw_only=True)
+class ContactConfig:
+    """When a toe is on the ground; see :mod:`loco_drake.retargeting.contacts`."""
+
+    # A toe lands below the first height and leaves above the second, both as fractions
+    # of the stance height.
+    land_height: float = 0.05
+    leave_height: float = 0.09
+    # ... and when it is slower, or faster, than these fractions of the trunk's speed,
+    # or than these speeds in m/s where that is more.
+    land_speed_ratio: float = 0.35
+    leave_speed_ratio: float = 0.5
+    land_speed: float = 0.4
+    leave_speed: float = 0.7
+    # Shorter contacts and shorter flights are taken for noise; s.
+    shortest_stance: float = 0.04
+    shortest_swing: float = 0.06
+
+
+@dataclass(kw_only=True)
+class SmoothingConfig:
+    """Cut-off frequencies of the zero-phase low-pass filters, in Hz."""
+
+    # Of the trunk's position, heading and pitch.
+    base: float = 5.0
+    # Of the toes.
+    toes: float = 7.0
+
+
+@dataclass(kw_only=True)
+class RetargetConfig:
+    """How the keypoints of one source become targets for a robot."""
+
+    # The source's stance height in m, where all its clips are of one body that may
+    # creep or stand tall. Without it, it is clip by clip this percentile of the height
+    # of the middle between withers and hip.
+    stance_height: float | None = None
+    stance_height_percentile: float = 50.0
+    # Where the virtual hip joints lie, on the line from hip to withers: ahead of the
+    # withers and ahead of the hip, and to the sides of that line, as fractions of the
+    # stance height.
+    front_hip: float = 0.0
+    rear_hip: float = 0.0
+    hip_spread: float = 0.0
+    # Added to the height of the robot's trunk, m.
+    base_height_offset: float = 0.0
+    # Multiplies the height of the toes beside the scale.
+    swing_height: float = 1.0
+    contact: ContactConfig = field(default_factory=ContactConfig)
+    smoothing: SmoothingConfig = field(default_factory=SmoothingConfig)
+
+
+def load_config(source: str) -> RetargetConfig:
+    """Returns the configuration that is shipped for ``source``.
+
+    Raises:
+        InputError: naming the sources that have one.
+    """
+    shipped = sorted(path.stem for path in _FOLDER.glob("*.yaml"))
+    return read_config(_FOLDER / f"{check_choice('source', source, shipped)}.yaml")
+
+
+def read_config(path: Path) -> RetargetConfig:
+    """Returns the configuration in a YAML file; fields not named keep their default.
+
+    Raises:
+        InputError: if the file is missing, names an unknown field, or holds a value
+            that cannot be.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"There is no retargeting configuration {str(path)!r}.")
+    try:
+        config: RetargetConfig = yaml_load_typed(
+            schema=RetargetConfig, filename=str(path), defaults=RetargetConfig()
+        )
+    except Exception as error:  # Drake and PyYAML raise many kinds
+        reason = " ".join(str(error).split())
+        raise InputError(
+            f"{path} is not a retargeting configuration: {reason}"
+        ) from None
+    _check(config, path)
+    return config
+
+
+def _check(config: RetargetConfig, path: Path) -> None:
+    positive = [
+        ("smoothing.base", config.smoothing.base),
+        ("smoothing.toes", config.smoothing.toes),
+        ("swing_height", config.swing_height),
+        ("stance_height", 1.0 if (H := config.stance_height) is None else H),
+        *((f"contact.{name}", value) for name, value in _values(config.contact)),
+    ]
+    for name, value in positive:
+        if not 0 < value < float("inf"):
+            raise InputError(f"{path}: {name} must be above 0, not {value}.")
+    if not 0 <= config.stance_height_percentile <= 100:
+        raise InputError(f"{path}: stance_height_percentile must be within 0 to 100.")
+
+
+def _values(config: Any) -> list[tuple[str, float]]:
+    return [(item.name, getattr(config, item.name)) for item in fields(config)]

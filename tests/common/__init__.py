@@ -1,0 +1,1 @@
+"""Tests of loco_drake.cli."""

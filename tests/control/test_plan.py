@@ -1,0 +1,149 @@
+import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import JacobianWrtVariable
+
+from loco_drake.common.errors import InputError
+from loco_drake.control.plan import (
+    PLAN_DT,
+    join_plans,
+    make_plan,
+    plan_from_motion,
+    standing_plan,
+)
+from loco_drake.models.legs import LEGS
+from loco_drake.models.robots import AddRobotModel
+from tests.synthetic_motion import synthetic_motion
+
+
+@pytest.fixture(scope="module")
+def plant():
+    plant = MultibodyPlant(0.0)
+    AddRobotModel(Parser(plant), "go2", visual=False)
+    plant.Finalize()
+    return plant
+
+
+def test_q_and_v_are_in_the_order_of_the_plant(go2, plant):
+    motion = synthetic_motion("dog-trot", 1.0, 0.5, 0.3)
+    plan = plan_from_motion(go2, motion)
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, plan.q[7])
+    plant.SetVelocities(context, plan.v[7])
+    base = plant.GetBodyByName("base")
+    X_WB = plant.EvalBodyPoseInWorld(context, base)
+    V_WB = plant.EvalBodySpatialVelocityInWorld(context, base)
+    np.testing.assert_allclose(X_WB.translation(), motion.base_position[7])
+    np.testing.assert_allclose(V_WB.rotational(), motion.base_angular_velocity[7])
+    np.testing.assert_allclose(V_WB.translational(), motion.base_velocity[7])
+    for j, name in enumerate(motion.joint_names):
+        joint = plant.GetJointByName(name)
+        assert joint.get_angle(context) == motion.joint_positions[7, j]
+        assert joint.get_angular_rate(context) == motion.joint_velocities[7, j]
+
+
+def test_toes_are_where_the_plant_has_them(trot, plant):
+    context = plant.CreateDefaultContext()
+    for k in (0, 33, 120):
+        plant.SetPositions(context, trot.q[k])
+        for leg, p_WF in zip(LEGS, trot.p_WF[k], strict=True):
+            frame = plant.GetFrameByName(f"{leg}_foot")
+            X_WF = frame.CalcPoseInWorld(context)
+            np.testing.assert_allclose(X_WF.translation(), p_WF, atol=1e-12)
+
+
+def test_copies_are_the_same_object_and_arrays_read_only(trot):
+    assert copy.deepcopy(trot) is trot
+    assert copy.copy(trot) is trot
+    with pytest.raises(ValueError, match="read-only"):
+        trot.q[0, 0] = 2.0
+
+
+def test_samples_are_due_on_the_plans_own_clock(trot):
+    shifted = replace(trot, start_time=3.0)
+    assert shifted.index(3.0) == 0
+    assert shifted.index(3.0 + 7 * PLAN_DT) == 7
+    assert shifted.index(3.0 + 7.4 * PLAN_DT) == 7
+    assert shifted.index(0.0) == 0  # before it starts: its first sample
+    assert shifted.index(99.0) == len(trot) - 1  # after it ends: its last
+    assert shifted.end_time == pytest.approx(3.0 + 4.0)
+
+
+def test_a_plan_cut_in_two_and_joined_is_the_plan(trot):
+    tail = trot.tail(50)
+    assert tail.start_time == pytest.approx(1.0)
+    head = replace(trot, **{n: getattr(trot, n)[:50].copy() for n in _arrays()})
+    joined = join_plans(head, tail)
+    assert joined.start_time == trot.start_time
+    for name in _arrays():
+        np.testing.assert_array_equal(getattr(joined, name), getattr(trot, name))
+
+
+def _arrays():
+    return ("q", "v", "set_points", "p_WF", "contacts", "labels", "path_time")
+
+
+def test_motion_of_another_rate_or_robot_is_refused(go2):
+    motion = synthetic_motion("dog-trot", 1.0)
+    with pytest.raises(InputError, match="25"):
+        plan_from_motion(go2, replace(motion, fps=25.0))
+    with pytest.raises(InputError, match="of a1, not of go2"):
+        plan_from_motion(go2, replace(motion, robot="a1"))
+    names = ("x", *motion.joint_names[1:])
+    with pytest.raises(InputError, match=r"joints .* FL_hip_joint, FL_thigh_joint"):
+        plan_from_motion(go2, replace(motion, joint_names=names))
+    with pytest.raises(InputError, match=r"dog-waltz.* dog-pace, dog-trot"):
+        plan_from_motion(go2, replace(motion, gait="waltz"))
+
+
+def test_the_standing_plan_has_its_soles_on_the_ground(go2):
+    plan = standing_plan(go2)
+    np.testing.assert_allclose(plan.p_WF[0, :, 2], go2.foot_radius, atol=1e-12)
+
+
+def feed_forward(robot, plan):
+    """The torques that the PD exerts where all is as planned."""
+    off = plan.set_points - plan.q[:, 7:]
+    return robot.kp * off - robot.kd * plan.v[:, 6:]
+
+
+def test_feed_forward_of_standing_feet_carries_the_weight(go2, plant):
+    """By Drake's Jacobians: the toes' forces and the joints' torques balance."""
+    plan = standing_plan(go2)
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, plan.q[0])
+    generalized = np.zeros(plant.num_velocities())
+    for leg in LEGS:
+        frame = plant.GetFrameByName(f"{leg}_foot")
+        J = plant.CalcJacobianTranslationalVelocity(
+            context,
+            JacobianWrtVariable.kV,
+            frame,
+            np.zeros(3),
+            plant.world_frame(),
+            plant.world_frame(),
+        )
+        generalized += J.T @ [0.0, 0.0, plant.CalcTotalMass(context) * 9.81 / 4]
+    np.testing.assert_allclose(feed_forward(go2, plan)[0], -generalized[6:], atol=1e-9)
+
+
+def test_feed_forward_without_contact_is_what_accelerates_the_joints(go2):
+    """A joint that speeds up by 10 rad/s in a second: tau = I * 10."""
+    rest = standing_plan(go2)
+    count = 51
+    v = np.zeros((count, 18))
+    v[:, 8] = np.linspace(0, 10, count)
+    plan = make_plan(
+        go2,
+        q=np.repeat(rest.q, count, axis=0),
+        v=v,
+        contacts=np.zeros((count, 4), dtype=bool),
+        labels=np.zeros(count, dtype=int),
+    )
+    expected = np.zeros(12)
+    expected[2] = go2.joint_inertia[2] * 10
+    np.testing.assert_allclose(feed_forward(go2, plan)[25], expected, atol=1e-9)
