@@ -59,7 +59,7 @@ def make_sleeper():
 
 SCRIPT = """
 from loco_drake.common.parallel import map_in_workers
-from tests.test_parallel import make_sleeper
+from tests.common.test_parallel import make_sleeper
 if __name__ == "__main__":
     for _ in map_in_workers(make_sleeper, [0.2] * 1000, 2):
         print("one", flush=True)
