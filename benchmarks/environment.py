@@ -26,6 +26,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from loco_drake.common.files import atomic_path
+from loco_drake.control.action import set_points
 from loco_drake.control.fall import has_fallen
 from loco_drake.control.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.control.plan import PLAN_DT, Plan, plan_from_motion
@@ -139,7 +140,7 @@ class BarePlant:
         plan, first = episode.plan, episode.first
         self._restart(plan.state[first])
         samples = np.minimum(first + 1 + np.arange(episode.steps), len(plan) - 1)
-        return self._advance(plan.set_points[samples])
+        return self._advance(set_points(self._robot, plan)[samples])
 
     def stand(self, steps: int) -> float:
         """Stands still for ``steps``; returns the seconds they took."""

@@ -4,7 +4,7 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
-from loco_drake.control.action import joint_targets
+from loco_drake.control.action import joint_targets, set_points
 from loco_drake.control.plan import PLAN_DT, standing_plan
 from loco_drake.models.robots import Robot
 
@@ -31,6 +31,7 @@ class JointTargets(LeafSystem):
 
     def __init__(self, robot: Robot) -> None:
         super().__init__()
+        self._robot = robot
         size = len(robot.joint_names)
         self._plan = self.DeclareAbstractInputPort("plan", Value(standing_plan(robot)))
         self._action = self.DeclareVectorInputPort("action", size)
@@ -49,8 +50,8 @@ class JointTargets(LeafSystem):
     def _sample(self, context: Context, state: State) -> EventStatus:
         plan = self._plan.Eval(context)
         action = self._action.Eval(context)
-        set_points = plan.set_points[plan.index(context.get_time() + PLAN_DT)]
+        due = set_points(self._robot, plan)[plan.index(context.get_time() + PLAN_DT)]
         targets = state.get_mutable_discrete_state(int(self._targets))
-        targets.set_value(joint_targets(set_points, action))
+        targets.set_value(joint_targets(due, action))
         state.get_mutable_discrete_state(int(self._held)).set_value(action)
         return EventStatus.Succeeded()

@@ -14,7 +14,7 @@ from pydrake.systems.framework import (
 )
 
 from loco_drake.common.errors import InputError
-from loco_drake.control.plan import LOOK_PERIOD, PLAN_DT, Plan, join_plans, make_plan
+from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD, Plan, join_plans, make_plan
 from loco_drake.generation.generate import check_sampling, chunk_labels
 from loco_drake.generation.motion_model import (
     MotionModel,
@@ -97,7 +97,7 @@ class ReferenceGenerator(LeafSystem):
             prerequisites_of_calc={self.abstract_state_ticket(self._script)},
         )
         self.DeclarePeriodicUnrestrictedUpdateEvent(
-            period_sec=LOOK_PERIOD, offset_sec=0.0, update=self._update
+            period_sec=UPDATE_PERIOD, offset_sec=0.0, update=self._update
         )
 
     def SetReference(self, context: Context, *, gait: str, seed: int) -> None:

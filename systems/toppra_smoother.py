@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 
 from loco_drake.common.rotations import quat_continuous
 from loco_drake.control.plan import (
-    LOOK_PERIOD,
     PLAN_DT,
+    UPDATE_PERIOD,
     Plan,
     join_plans,
     make_plan,
@@ -96,7 +96,7 @@ class ToppraSmoother(LeafSystem):
         )
         self.DeclareInitializationUnrestrictedUpdateEvent(self._initialize)
         self.DeclarePeriodicUnrestrictedUpdateEvent(
-            period_sec=LOOK_PERIOD, offset_sec=0.0, update=self._update
+            period_sec=UPDATE_PERIOD, offset_sec=0.0, update=self._update
         )
 
     def _calc_plan(self, context: Context, output: AbstractValue) -> None:
@@ -133,7 +133,7 @@ class ToppraSmoother(LeafSystem):
 
     def _extended(self, progress: _Progress, raw: Plan, now: float) -> _Progress:
         """Returns ``progress`` with as many chunks added as are due and possible."""
-        due = now + self._config.lookahead + LOOK_PERIOD
+        due = now + self._config.lookahead + UPDATE_PERIOD
         if not progress.started:
             progress = _Progress(standing_plan(self._robot, now))
         while not progress.started or progress.plan.end_time < due:

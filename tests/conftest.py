@@ -5,7 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from loco_drake.control.plan import Plan, plan_from_motion
+from loco_drake.models.robots import Robot, get_robot
 from tests.synthetic import write_data_folder
+from tests.synthetic_motion import synthetic_motion
 
 
 @pytest.fixture(scope="session")
@@ -22,3 +25,14 @@ def made_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A data folder with made recordings of a dog: pace, trot and gallop, 4 s each."""
     folder = tmp_path_factory.mktemp("made_data")
     return write_data_folder(folder, gaits=("pace", "trot", "gallop"))
+
+
+@pytest.fixture(scope="session")
+def go2() -> Robot:
+    return get_robot("go2")
+
+
+@pytest.fixture(scope="session")
+def trot(go2: Robot) -> Plan:
+    """Four seconds of a slow trot that turns."""
+    return plan_from_motion(go2, synthetic_motion("dog-trot", 4.0, 0.5, 0.2))

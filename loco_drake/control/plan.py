@@ -1,6 +1,6 @@
 """The one type that generator, smoother, player, policy and reward exchange."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -9,20 +9,20 @@ from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import quat_conjugate, quat_rotate, yaw_of, yaw_quat
-from loco_drake.control.feed_forward import feed_forward_torques
 from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import Robot
-from loco_drake.motion.gaits import parse_label
+from loco_drake.motion.gaits import LABELS, parse_label
 from loco_drake.motion.motion import FPS, Motion
 
 Array = NDArray[np.float64]
 
 PLAN_DT = 1.0 / FPS
-# s between a producer's looks at whether more plan is needed. A power of two times
-# PLAN_DT: these events then come at the very times of the control periods. With .1 s
-# they would be 6e-17 s apart at .3 s, and CENIC explodes over a step that short.
-LOOK_PERIOD = 4 * PLAN_DT
-_ARRAYS = ("q", "v", "set_points", "p_WF", "contacts", "labels", "path_time")
+# s between updates of what makes plans. A power of two times PLAN_DT: these events then
+# come at the very times of the control periods. With .1 s they would be 6e-17 s apart
+# at .3 s, and CENIC explodes over a step that short.
+UPDATE_PERIOD = 4 * PLAN_DT
+_ARRAYS = ("q", "v", "vdot", "p_WF", "contacts", "labels", "path_time")
+_MAX_NORM_ERROR = 1e-3  # of quaternions
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,27 +33,30 @@ class Plan:
     in the order of the robot's MultibodyPlant: ``q = [R_WB as w x y z, p_WB, joints]``
     and ``v = [w_WB_W, v_WB_W, joint velocities]``.
 
-    A Plan is held in abstract state and compared by identity; copying one returns the
-    same object, since Drake copies all abstract state at each unrestricted update.
+    A Plan owns its arrays, which are read-only. It is held in abstract state and
+    compared by identity; copying one returns the same object, since Drake copies all
+    abstract state at each unrestricted update.
 
     Attributes:
         start_time: context time in s of the first sample.
         q: positions, shape (N, 7 + J).
         v: velocities, shape (N, 6 + J).
-        set_points: of the joints' PD, in rad, shape (N, J): the positions, and beyond
-            them what the damping and the feed-forward torques need.
+        vdot: accelerations, the time derivatives of ``v``, shape (N, 6 + J).
         p_WF: centres of the toe spheres in m, shape (N, 4, 3).
         contacts: whether each foot is meant to be on the ground, shape (N, 4).
         labels: index into :data:`loco_drake.motion.gaits.LABELS`, shape (N,).
         path_time: seconds of the unsmoothed motion that have passed, shape (N,);
             the smoother slows this clock down where the robot cannot follow.
         open_ended: whether whoever made the plan will write more of it.
+
+    Raises:
+        InputError: if an array has the wrong type or shape, or holds what cannot be.
     """
 
     start_time: float
     q: Array
     v: Array
-    set_points: Array
+    vdot: Array
     p_WF: Array
     contacts: NDArray[np.bool_]
     labels: NDArray[np.int64]
@@ -61,11 +64,53 @@ class Plan:
     open_ended: bool = False
 
     def __post_init__(self) -> None:
-        for name in _ARRAYS:
-            value = getattr(self, name)
-            if len(value) != len(self.q):
-                raise ValueError(f"{name} has {len(value)} samples, q {len(self.q)}")
-            value.setflags(write=False)
+        n, size = np.shape(self.q) if np.ndim(self.q) == 2 else (0, 0)
+        shapes = (
+            (n, size),
+            (n, size - 1),
+            (n, size - 1),
+            (n, 4, 3),
+            (n, 4),
+            (n,),
+            (n,),
+        )
+        types = {"contacts": np.bool_, "labels": np.int64}
+        for name, shape in zip(_ARRAYS, shapes, strict=True):
+            wanted = types.get(name, np.float64)
+            given = np.asarray(getattr(self, name))
+            if not np.can_cast(given.dtype, wanted, "same_kind"):
+                raise InputError(
+                    f"A plan's {name} must be of type {wanted.__name__}, "
+                    f"not {given.dtype}."
+                )
+            if given.shape != shape or n < 1 or size < 8:
+                raise InputError(
+                    f"A plan's q must have the shape (N, 7 + J), N at least 1, and its "
+                    f"{name} one that goes with that, not {given.shape}."
+                )
+            # A copy: whoever made the array may hold it, or a view of it.
+            own: NDArray[Any] = given.astype(wanted)
+            own.setflags(write=False)
+            object.__setattr__(self, name, own)
+        self._check_values()
+
+    def _check_values(self) -> None:
+        """Raises InputError if a number in it cannot be."""
+        finite = all(np.isfinite(getattr(self, name)).all() for name in _ARRAYS)
+        if not (finite and np.isfinite(self.start_time)):
+            raise InputError("A plan's numbers and start time must be finite.")
+        norms = np.linalg.norm(self.q[:, :4], axis=1)
+        if np.abs(norms - 1).max() > _MAX_NORM_ERROR:
+            raise InputError(
+                "A plan's q must begin with unit quaternions w, x, y, z; one has the "
+                f"length {norms[np.abs(norms - 1).argmax()]:.4g}."
+            )
+        if self.labels.min() < 0 or self.labels.max() >= len(LABELS):
+            raise InputError(
+                f"A plan's labels must be indices from 0 to {len(LABELS) - 1}."
+            )
+        if (np.diff(self.path_time) < 0).any():
+            raise InputError("A plan's path_time must never decrease.")
 
     def __len__(self) -> int:
         return len(self.q)
@@ -76,16 +121,21 @@ class Plan:
     def __deepcopy__(self, memo: dict[int, Any]) -> "Plan":
         return self
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Unpickled arrays can be written to; those of a Plan cannot.
+        return Plan, tuple(getattr(self, field.name) for field in fields(self))
+
     @cached_property
     def state(self) -> Array:
         """[q, v], shape (N, 13 + 2 J)."""
-        return np.hstack((self.q, self.v))
+        return _read_only(np.hstack((self.q, self.v)))
 
     @cached_property
     def p_BoF_H(self) -> Array:
         """Toes relative to the base in its heading frame (z up), m, shape (N, 4, 3)."""
         q_HW = quat_conjugate(yaw_quat(yaw_of(self.q[:, :4])))
-        return quat_rotate(q_HW[:, None], self.p_WF - self.q[:, None, 4:7])
+        p_BoF_W = self.p_WF - self.q[:, None, 4:7]
+        return _read_only(quat_rotate(q_HW[:, None], p_BoF_W))
 
     @property
     def end_time(self) -> float:
@@ -94,13 +144,18 @@ class Plan:
 
     def tail(self, first: int) -> "Plan":
         """Returns the plan from sample ``first`` on."""
-        arrays = {name: getattr(self, name)[first:].copy() for name in _ARRAYS}
+        arrays: dict[str, Any] = {name: getattr(self, name)[first:] for name in _ARRAYS}
         return replace(self, start_time=self.start_time + first * PLAN_DT, **arrays)
 
     def index(self, time: float) -> int:
         """Returns the sample nearest to ``time``, at the ends the first or last."""
         k = round((time - self.start_time) / PLAN_DT)
         return min(max(k, 0), len(self) - 1)
+
+
+def _read_only(array: Array) -> Array:
+    array.setflags(write=False)
+    return array
 
 
 def make_plan(
@@ -114,18 +169,13 @@ def make_plan(
     path_time: Array | None = None,
     open_ended: bool = False,
 ) -> Plan:
-    """Returns a Plan; toes and set-points follow from the robot's model.
-
-    The set-points are q + (kd v + tau) / kp, with the gains of the PD and the torques
-    tau of :func:`feed_forward_torques`: all act through the position.
-    """
+    """Returns a Plan; toes follow from the robot's model, accelerations from ``v``."""
     p_BF = toe_positions(robot, q[:, 7:])
     p_WF = q[:, None, 4:7] + quat_rotate(q[:, None, :4], p_BF)
-    written = PLAN_DT * np.arange(len(q), dtype=np.float64)
-    times = written if path_time is None else path_time
-    torques = feed_forward_torques(robot, q, v, contacts)
-    set_points = q[:, 7:] + (robot.kd * v[:, 6:] + torques) / robot.kp
-    return Plan(start_time, q, v, set_points, p_WF, contacts, labels, times, open_ended)
+    if path_time is None:
+        path_time = PLAN_DT * np.arange(len(q), dtype=np.float64)
+    vdot = np.gradient(v, axis=0) * FPS if len(v) > 1 else np.zeros_like(v)
+    return Plan(start_time, q, v, vdot, p_WF, contacts, labels, path_time, open_ended)
 
 
 def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> Plan:
@@ -159,7 +209,7 @@ def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> P
                 motion.joint_velocities,
             )
         ),
-        contacts=motion.contacts.copy(),
+        contacts=motion.contacts,
         labels=np.full(len(motion), label.index),
         start_time=start_time,
     )

@@ -10,7 +10,7 @@ from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 from toppra.interpolator import AbstractGeometricPath
 
-from loco_drake.control.feed_forward import GRAVITY
+from loco_drake.control.action import GRAVITY
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.models.robots import Robot
 

@@ -16,7 +16,7 @@ from loco_drake.common.rotations import (
     yaw_of,
     yaw_quat,
 )
-from loco_drake.control.feed_forward import GRAVITY
+from loco_drake.control.action import GRAVITY
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import Robot

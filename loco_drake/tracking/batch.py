@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.rotations import quat_to_matrix
-from loco_drake.control.action import joint_targets
+from loco_drake.control.action import joint_targets, set_points
 from loco_drake.control.domain import Domain
 from loco_drake.control.fall import has_fallen
 from loco_drake.control.measurement import draw_error, measure
@@ -51,7 +51,9 @@ class TrackingBatch:
         # All samples of all plans, one after the other, for one look-up a step.
         self._first = np.cumsum(self._lengths) - self._lengths
         self._wanted = np.concatenate([plan.state for plan in plans])
-        self._set_points = np.concatenate([plan.set_points for plan in plans])
+        self._set_points = np.concatenate(
+            [set_points(self._robot, plan) for plan in plans]
+        )
         self._toes = np.concatenate([plan.p_BoF_H for plan in plans])
         self._contacts = np.concatenate([plan.contacts for plan in plans])
         self._labels = np.concatenate([plan.labels for plan in plans])

@@ -1,4 +1,5 @@
 import copy
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
 
 from loco_drake.common.errors import InputError
+from loco_drake.control.action import set_points
 from loco_drake.control.plan import (
     PLAN_DT,
     join_plans,
@@ -63,6 +65,49 @@ def test_copies_are_the_same_object_and_arrays_read_only(trot):
         trot.q[0, 0] = 2.0
 
 
+def test_a_plan_does_not_change_with_the_arrays_that_it_was_made_of(trot):
+    """Neither through an array, nor a view of it, nor a view of a frozen array."""
+    q, v = trot.q.copy(), trot.v.copy()
+    frozen = v[:]
+    v.setflags(write=False)
+    plan = replace(trot, q=q[:], v=v)
+    q[:, 4] += 1.0
+    frozen[:, 3] += 1.0
+    np.testing.assert_array_equal(plan.q, trot.q)
+    np.testing.assert_array_equal(plan.v, trot.v)
+
+
+def test_a_plan_that_was_pickled_is_as_immutable(trot):
+    """Worker processes get plans so."""
+    plan = pickle.loads(pickle.dumps(trot))
+    for name in (*_arrays(), "state", "p_BoF_H"):
+        np.testing.assert_array_equal(getattr(plan, name), getattr(trot, name))
+        assert not getattr(plan, name).flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil", "message"),
+    [
+        ("q", lambda a: a[:, :-1], "its v one that goes"),
+        ("q", lambda a: a[0], "q must have the shape"),
+        ("v", lambda a: np.hstack((a, a)), "its v one that goes with that"),
+        ("vdot", lambda a: a[:-1], "vdot"),
+        ("p_WF", lambda a: a[:, :3], "p_WF"),
+        ("contacts", lambda a: a.astype(float), "contacts must be of type bool"),
+        ("labels", lambda a: a + 0.7, "labels must be of type int64"),
+        ("labels", lambda a: a + 15, "indices from 0 to 14"),
+        ("labels", lambda a: a - 5, "indices from 0 to 14"),
+        ("path_time", lambda a: a[::-1], "path_time must never decrease"),
+        ("q", lambda a: 1.1 * a, "length 1.1"),
+        ("v", lambda a: a * np.nan, "must be finite"),
+        ("q", lambda a: a.astype(str), "q must be of type float64"),
+    ],
+)
+def test_what_is_no_plan_is_refused_by_the_arrays_name(trot, name, spoil, message):
+    with pytest.raises(InputError, match=message):
+        replace(trot, **{name: spoil(getattr(trot, name))})
+
+
 def test_samples_are_due_on_the_plans_own_clock(trot):
     shifted = replace(trot, start_time=3.0)
     assert shifted.index(3.0) == 0
@@ -84,7 +129,7 @@ def test_a_plan_cut_in_two_and_joined_is_the_plan(trot):
 
 
 def _arrays():
-    return ("q", "v", "set_points", "p_WF", "contacts", "labels", "path_time")
+    return ("q", "v", "vdot", "p_WF", "contacts", "labels", "path_time")
 
 
 def test_motion_of_another_rate_or_robot_is_refused(go2):
@@ -107,7 +152,7 @@ def test_the_standing_plan_has_its_soles_on_the_ground(go2):
 
 def feed_forward(robot, plan):
     """The torques that the PD exerts where all is as planned."""
-    off = plan.set_points - plan.q[:, 7:]
+    off = set_points(robot, plan) - plan.q[:, 7:]
     return robot.kp * off - robot.kd * plan.v[:, 6:]
 
 

@@ -1,6 +1,6 @@
 """Events that belong together come at the same time, to the last bit."""
 
-from loco_drake.control.plan import LOOK_PERIOD, PLAN_DT
+from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD
 from loco_drake.evaluation.rollout import Recorder
 from loco_drake.evaluation.tracking import normalized_return
 from loco_drake.models.plant import PlantConfig
@@ -8,8 +8,8 @@ from loco_drake.systems.scenario import GeneratedReference, Scenario
 
 
 def test_producers_look_at_the_times_of_control_periods():
-    looks = round(LOOK_PERIOD / PLAN_DT)
-    assert all(k * LOOK_PERIOD == looks * k * PLAN_DT for k in range(100_000))
+    looks = round(UPDATE_PERIOD / PLAN_DT)
+    assert all(k * UPDATE_PERIOD == looks * k * PLAN_DT for k in range(100_000))
     # What goes wrong with another period.
     assert 15 * PLAN_DT != 3 * 0.1
 

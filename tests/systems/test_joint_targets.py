@@ -2,8 +2,7 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from loco_drake.control.action import ACTION_SCALE
-from loco_drake.control.feed_forward import feed_forward_torques
+from loco_drake.control.action import ACTION_SCALE, feed_forward_torques
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.joint_targets import JointTargets
@@ -30,7 +29,7 @@ def test_targets_are_the_next_sample_the_action_and_the_feed_forward(go2, trot):
     simulator.AdvanceTo(20.5 * PLAN_DT)
     desired = diagram.GetOutputPort("desired_state").Eval(context)
     # The last sampling was at sample 20; 100 Nm/rad and 2 Nm s/rad are the Go2's.
-    torques = feed_forward_torques(get_robot("go2"), trot.q, trot.v, trot.contacts)
+    torques = feed_forward_torques(get_robot("go2"), trot)
     expected = trot.q[21, 7:] + ACTION_SCALE * action
     expected += (2 * trot.v[21, 6:] + torques[21]) / 100
     np.testing.assert_allclose(desired[:12], expected, atol=1e-12)
