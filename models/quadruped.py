@@ -72,6 +72,10 @@ class Quadruped(ABC):
         """Returns p_BF in m, the centres of the toe spheres, (..., 4, 3)."""
 
     @abstractmethod
+    def toe_jacobians(self, joints: Array) -> Array:
+        """Returns d p_BF / d joints of each leg, m/rad, (..., 4, 3 rows x y z, n)."""
+
+    @abstractmethod
     def knee_positions(self, joints: Array) -> Array:
         """Returns the origins of the legs' last joints in B, m, (..., 4, 3)."""
 

@@ -12,7 +12,7 @@ the frame at the centre of its toe's sphere, and the usual stance::
 """
 
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +24,7 @@ from pydrake.multibody.tree import RevoluteJoint
 
 from loco_drake.common.errors import InputError, check_choice
 
-from .chain_robot import ChainRobot
-from .chains import LegChains
+from .chains import ChainRobot
 from .legs import LEGS
 from .meshes import vendor_folder
 from .quadruped import Quadruped
@@ -188,27 +187,29 @@ def _make(file: RobotFile, path: Path) -> ChainRobot:
     ]
     if wrong:
         raise InputError(f"In the stance {wrong[0]}.")
-    chains = _chains(plant, file.trunk, joints, [leg.foot for leg in legs])
-    toes = chains.forward(stand.reshape(4, -1))[0]
-    stand_height = float(file.foot_radius - toes[:, 2].min())
-    if stand_height <= file.foot_radius:
-        raise InputError("In the stance the feet are not below the trunk.")
-    return ChainRobot(
+    axes, origins, toes = _chains(plant, file.trunk, joints, [g.foot for g in legs])
+    robot = ChainRobot(
         name=name,
         definition=str(path.resolve()),
         joint_names=joint_names,
         joint_lower=lower,
         joint_upper=upper,
         joint_speed_limits=speed,
-        p_BHip=chains.origins[:, 0].copy(),
+        p_BHip=origins[:, 0].copy(),
         foot_radius=file.foot_radius,
         stand_joints=stand,
-        stand_height=stand_height,
+        stand_height=0.0,
         trunk_frame=file.trunk,
         foot_frames=tuple(leg.foot for leg in legs),
         model=model,
-        chains=chains,
+        axes=axes,
+        origins=origins,
+        toes=toes,
     )
+    lowest = float(robot.toe_positions(stand)[:, 2].min())
+    if lowest >= 0:
+        raise InputError("In the stance the feet are not below the trunk.")
+    return replace(robot, stand_height=file.foot_radius - lowest)
 
 
 def _find_urdf(url: str, folder: Path) -> Path:
@@ -286,7 +287,8 @@ def _limits(legs: list[LegFile], key: str, defaults: list[float]) -> Array:
 
 def _chains(
     plant: MultibodyPlant, trunk: str, joints: list[RevoluteJoint], feet: list[str]
-) -> LegChains:
+) -> tuple[Array, Array, Array]:
+    """Returns axes, origins and toes as :class:`.chains.ChainRobot` has them."""
     context = plant.CreateDefaultContext()
     base = plant.GetFrameByName(trunk)
     for joint in joints:
@@ -297,8 +299,6 @@ def _chains(
         for X_BJ, joint in zip(poses, joints, strict=True)
     ]
     toes = [plant.GetFrameByName(f).CalcPose(context, base).translation() for f in feet]
-    return LegChains(
-        axes=np.array(axes).reshape(4, -1, 3),
-        origins=np.array([X_BJ.translation() for X_BJ in poses]).reshape(4, -1, 3),
-        toes=np.array(toes),
-    )
+    origins = [X_BJ.translation() for X_BJ in poses]
+    legs = (4, len(joints) // 4, 3)
+    return np.reshape(axes, legs), np.reshape(origins, legs), np.array(toes)

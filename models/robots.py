@@ -16,7 +16,6 @@ from pydrake.systems.framework import DiagramBuilder
 
 from loco_drake.common.errors import check_choice
 
-from . import kinematics
 from .legs import LEGS
 from .meshes import AddMeshPackage
 from .quadruped import Quadruped
@@ -33,8 +32,13 @@ _MODELS = Path(__file__).parent
 class Robot(Quadruped):
     """A quadruped with three joints a leg, all read from its Drake model.
 
-    Joints, and so actuators, are in a leg hip (abduction), thigh, calf. The methods are
-    the closed forms of :mod:`loco_drake.models.kinematics`.
+    Every leg is a hip (about x, abduction), a thigh and a calf (both about y), in this
+    order. With the hip joint at p_BHip, the thigh joint ``d`` to its side, links of
+    length ``l1`` and ``l2`` that hang down at zero, and angles a, b, c,
+
+        p_BF = p_BHip + Rx(a) [-l1 sin b - l2 sin(b + c), d, -l1 cos b - l2 cos(b + c)]
+
+    from which kinematics follow in closed form.
 
     Attributes:
         url: the model, ``package://...``; see :func:`ConfigureParser`.
@@ -72,7 +76,9 @@ class Robot(Quadruped):
     @property
     def folded_length(self) -> float:
         """From the thigh joint, the calf at its limit."""
-        return kinematics.folded_length(self)
+        l1, l2 = self.thigh_length, self.calf_length
+        square = l1**2 + l2**2 + 2 * l1 * l2 * np.cos(self.joint_lower[2])
+        return float(np.sqrt(square))
 
     def AddModel(self, parser: Parser) -> ModelInstanceIndex:
         """Adds the model, without its meshes, to the parser's plant."""
@@ -80,20 +86,87 @@ class Robot(Quadruped):
 
     def toe_positions(self, joints: Array) -> Array:
         """Returns p_BF in m, shape (..., 4, 3)."""
-        return kinematics.toe_positions(self, joints)
+        return self._ends(joints, self.calf_length)
 
     def knee_positions(self, joints: Array) -> Array:
-        """Returns the origins of the calf joints in B, m, shape (..., 4, 3)."""
-        return kinematics.knee_positions(self, joints)
+        """Returns the origins of the last joints in B, m, shape (..., 4, 3)."""
+        return self._ends(joints, 0.0)
+
+    def toe_jacobians(self, joints: Array) -> Array:
+        """Returns d p_BF / d joints, m/rad, shape (..., 4, 3, n)."""
+        a, b, c = _angles(joints)
+        x2 = -self.calf_length * np.sin(b + c)
+        z2 = -self.calf_length * np.cos(b + c)
+        x = -self.thigh_length * np.sin(b) + x2
+        z = -self.thigh_length * np.cos(b) + z2
+        sin_a, cos_a = np.sin(a), np.cos(a)
+        d = self.abduction_offset
+        J = np.zeros((*a.shape, 3, 3))
+        J[..., 1, 0] = -sin_a * d - cos_a * z
+        J[..., 2, 0] = cos_a * d - sin_a * z
+        # Turning about y by +db moves (x, z) by (z, -x) db.
+        J[..., 0, 1] = z
+        J[..., 1, 1] = sin_a * x
+        J[..., 2, 1] = -cos_a * x
+        J[..., 0, 2] = z2
+        J[..., 1, 2] = sin_a * x2
+        J[..., 2, 2] = -cos_a * x2
+        return J
+
+    def leg_joints(self, p_BF: Array) -> Array:
+        """Returns joints (..., 12) in rad that put the toes at ``p_BF`` (..., 4, 3).
+
+        Of the solutions, this is the one with the foot below the hip's axis, in the
+        plane of the leg, and the knee bent backward (calf negative), as these robots
+        are built. A target that the calf's limits do not let the toe reach is clamped:
+        the leg then points at it, as long (or short) as it can be. Hip and thigh are
+        not clamped, but within (-pi, pi].
+        """
+        x, y, z = np.moveaxis(p_BF - self.p_BHip, -1, 0)
+        d, l1, l2 = self.abduction_offset, self.thigh_length, self.calf_length
+        # Within the plane of the leg the toe is at (x, height).
+        height = -np.sqrt(np.maximum(y * y + z * z - d * d, 0.0))
+        a = np.arctan2(z, y) - np.arctan2(height, d)
+        cos_c = (x * x + height * height - l1 * l1 - l2 * l2) / (2 * l1 * l2)
+        c = -np.arccos(np.minimum(np.maximum(cos_c, -1.0), 1.0))
+        c = np.minimum(np.maximum(c, self.joint_lower[2::3]), self.joint_upper[2::3])
+        b = np.arctan2(-x, -height) - np.arctan2(l2 * np.sin(c), l1 + l2 * np.cos(c))
+        joints = np.stack((_wrap(a), _wrap(b), c), axis=-1)
+        return joints.reshape(*joints.shape[:-2], 12)
 
     def nearest_joints(self, p_BF: Array) -> Array:
-        """Returns joints of the closed form, clipped to their limits."""
-        joints = kinematics.leg_joints(self, p_BF)
-        return np.clip(joints, self.joint_lower, self.joint_upper)
+        """Returns :meth:`leg_joints`, clipped to the joints' limits."""
+        return np.clip(self.leg_joints(p_BF), self.joint_lower, self.joint_upper)
 
     def reachable_toes(self, p_BF: Array) -> Array:
-        """Returns toes that are moved down, or along the leg, where that is needed."""
-        return kinematics.reachable_toes(self, p_BF)
+        """Returns where the joints' limits let the toes be, near ``p_BF``.
+
+        A toe nearer to its hip than the leg folds is moved down the trunk's z axis. A
+        leg that is too short points at its target.
+        """
+        x, y, z = np.moveaxis(p_BF - self.p_BHip, -1, 0)
+        # In the plane of the leg, whose distance from the hip's axis is the offset.
+        square = 1.001 * self.folded_length**2 + self.abduction_offset**2
+        drop = np.sqrt(np.maximum(square - x**2 - y**2, 0.0))
+        lowered = p_BF.copy()
+        lowered[..., 2] = np.minimum(p_BF[..., 2], self.p_BHip[:, 2] - drop)
+        folds = x**2 + y**2 + z**2 < square
+        goal = np.where(folds[..., None], lowered, p_BF)
+        return self.toe_positions(self.nearest_joints(goal))
+
+    def _ends(self, joints: Array, calf_length: float) -> Array:
+        """Returns the points (..., 4, 3) in B that far below the calf joints."""
+        a, b, c = _angles(joints)
+        x = -self.thigh_length * np.sin(b) - calf_length * np.sin(b + c)
+        z = -self.thigh_length * np.cos(b) - calf_length * np.cos(b + c)
+        sin_a, cos_a = np.sin(a), np.cos(a)
+        d = self.abduction_offset
+        p_B = np.empty((*a.shape, 3))
+        p_B[..., 0] = x
+        p_B[..., 1] = cos_a * d - sin_a * z
+        p_B[..., 2] = sin_a * d + cos_a * z
+        p_B += self.p_BHip
+        return p_B
 
 
 # Not frozen: yaml_load_typed sets the fields one by one.
@@ -248,3 +321,14 @@ def _trunk_size(plant: MultibodyPlant, scene_graph: SceneGraph) -> Array:
     (geometry,) = plant.GetCollisionGeometriesForBody(body)
     assert inspector.GetPoseInFrame(geometry).IsExactlyIdentity()
     return np.array(inspector.GetShape(geometry).size())
+
+
+def _angles(joints: Array) -> tuple[Array, Array, Array]:
+    """Returns the hips', thighs' and calves' angles, each of shape (..., 4)."""
+    return joints[..., 0::3], joints[..., 1::3], joints[..., 2::3]
+
+
+def _wrap(angle: Array) -> Array:
+    """Returns ``angle`` in rad, within (-pi, pi]; it must be within (-3 pi, 3 pi)."""
+    turns = (angle <= -np.pi).astype(np.float64) - (angle > np.pi)
+    return angle + 2 * np.pi * turns

@@ -8,7 +8,6 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from .kinematics import leg_joints, toe_jacobians, toe_positions
 from .robots import Robot
 
 Array = NDArray[np.float64]
@@ -51,17 +50,17 @@ def trot_joints(
     swing = np.clip((phase - _DUTY) / (1 - _DUTY), 0.0, 1.0)
     stride = speed * period * _DUTY
     ramp = np.clip(times / _RAMP, 0.0, 1.0)[:, None]
-    p_BF = np.tile(toe_positions(robot, robot.stand_joints), (len(times), 1, 1))
+    p_BF = np.tile(robot.toe_positions(robot.stand_joints), (len(times), 1, 1))
     forward = np.where(stance < 1, 0.5 - stance, -0.5 * np.cos(np.pi * swing))
     p_BF[..., 0] += ramp * stride * forward
     p_BF[..., 2] += ramp * lift * np.sin(np.pi * swing) ** 2
-    joints = leg_joints(robot, p_BF)
+    joints = robot.leg_joints(p_BF)
 
     load = np.clip(np.minimum(phase, _DUTY - phase) / _LOADING, 0.0, 1.0)
     load /= load.sum(axis=1, keepdims=True)
     f_F = np.zeros_like(p_BF)
     f_F[..., 2] = robot.mass * _GRAVITY * load
-    torques = -np.einsum("tlij,tli->tlj", toe_jacobians(robot, joints), f_F)
+    torques = -np.einsum("tlij,tli->tlj", robot.toe_jacobians(joints), f_F)
     velocities = np.gradient(joints, times, axis=0)
     return joints + (torques.reshape(joints.shape) + robot.kd * velocities) / robot.kp
 

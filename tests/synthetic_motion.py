@@ -8,7 +8,6 @@ from loco_drake.common.rotations import (
     quat_rotate,
     yaw_quat,
 )
-from loco_drake.models.kinematics import leg_joints
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
 from loco_drake.motion.motion import FPS, Motion, make_motion
@@ -58,8 +57,8 @@ def synthetic_motion(
         joint_names=robot.joint_names,
         base_position=p_WB,
         base_quaternion=quat_multiply(yaw_quat(yaw), q_HB),
-        joint_positions=leg_joints(
-            robot, quat_rotate(quat_conjugate(q_HB)[:, None], p_HF)
+        joint_positions=robot.leg_joints(
+            quat_rotate(quat_conjugate(q_HB)[:, None], p_HF)
         ),
         contacts=contacts,
         provenance={"recording": recording, "split": split},

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from loco_drake.common.rotations import quat_conjugate, quat_rotate
 from loco_drake.control.plan import Plan
-from loco_drake.models.kinematics import toe_jacobians
 from loco_drake.models.robots import Robot
 
 Array = NDArray[np.float64]
@@ -61,6 +60,6 @@ def feed_forward_torques(robot: Robot, plan: Plan) -> Array:
     force = robot.mass * GRAVITY * load[:, None] * share  # (N, 4)
     up_B = quat_rotate(quat_conjugate(plan.q[:, :4]), np.array([0.0, 0.0, 1.0]))
     # (N, 4, 3 rows x y z, 3 joints) against (N, 3)
-    lift = np.einsum("nlij,ni->nlj", toe_jacobians(robot, plan.q[:, 7:]), up_B)
+    lift = np.einsum("nlij,ni->nlj", robot.toe_jacobians(plan.q[:, 7:]), up_B)
     support = (-force[..., None] * lift).reshape(len(plan), -1)
     return support + robot.joint_inertia * plan.vdot[:, 6:]

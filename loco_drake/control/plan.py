@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import quat_conjugate, quat_rotate, yaw_of, yaw_quat
-from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import LABELS, parse_label
 from loco_drake.motion.motion import FPS, Motion
@@ -170,7 +169,7 @@ def make_plan(
     open_ended: bool = False,
 ) -> Plan:
     """Returns a Plan; toes follow from the robot's model, accelerations from ``v``."""
-    p_BF = toe_positions(robot, q[:, 7:])
+    p_BF = robot.toe_positions(q[:, 7:])
     p_WF = q[:, None, 4:7] + quat_rotate(q[:, None, :4], p_BF)
     if path_time is None:
         path_time = PLAN_DT * np.arange(len(q), dtype=np.float64)

@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.rotations import heading_matrix, quat_error, quat_to_matrix
-from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import Robot
 
 Array = NDArray[np.float64]
@@ -43,7 +42,7 @@ def reward_terms(
     q, v = state[..., :19], state[..., 19:]
     if R_WB is None:
         R_WB = quat_to_matrix(q[..., :4])
-    p_BoF_H = toe_positions(robot, q[..., 7:]) @ (
+    p_BoF_H = robot.toe_positions(q[..., 7:]) @ (
         np.swapaxes(R_WB, -1, -2) @ heading_matrix(R_WB)
     )
     gap = q[..., 4:] - plan_state[..., 4:19]

@@ -1,7 +1,6 @@
 """Pictures of what tokenizer and generator do."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +15,6 @@ from loco_drake.common.rotations import (
     yaw_quat,
 )
 from loco_drake.evaluation.recognition import Recognition
-from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import Motion
@@ -123,15 +121,13 @@ def draw_strip(
     """
     frames = np.linspace(0, STRIP_SECONDS * motion.fps, POSES).round().astype(int)
     frames = np.minimum(frames, len(motion) - 1)
-    # A leg whose calf has no length ends at its knee.
-    to_knee = replace(robot, calf_length=0.0)
     hips = np.broadcast_to(robot.p_BHip, (len(motion), 4, 3))
     legs = [
         _seen(motion, points)[frames]
         for points in (
             hips,
-            toe_positions(to_knee, motion.joint_positions),
-            toe_positions(robot, motion.joint_positions),
+            robot.knee_positions(motion.joint_positions),
+            robot.toe_positions(motion.joint_positions),
         )
     ]
     for place, (hip, knee, toe) in enumerate(zip(*legs, strict=True)):

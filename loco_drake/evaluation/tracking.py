@@ -18,7 +18,6 @@ from loco_drake.common.rotations import (
 )
 from loco_drake.control.action import GRAVITY
 from loco_drake.control.plan import PLAN_DT
-from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import Robot
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.quality import stance_slip_speeds
@@ -128,7 +127,7 @@ def slip_speeds(rollout: Rollout, robot: Robot) -> Array:
     See :func:`loco_drake.motion.quality.stance_slip_speeds`.
     """
     q = rollout.state[:, :19]
-    p_WF = q[:, None, 4:7] + quat_rotate(q[:, None, :4], toe_positions(robot, q[:, 7:]))
+    p_WF = q[:, None, 4:7] + quat_rotate(q[:, None, :4], robot.toe_positions(q[:, 7:]))
     return stance_slip_speeds(p_WF, robot.foot_radius, FPS)
 
 

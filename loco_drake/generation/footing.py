@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from loco_drake.common.rotations import quat_conjugate, quat_rotate
 from loco_drake.generation import features as ft
 from loco_drake.generation.features import positions, rotate_plane
-from loco_drake.models.kinematics import leg_joints, toe_positions
 from loco_drake.models.robots import Robot
 from loco_drake.motion.motion import FPS
 
@@ -126,7 +125,7 @@ def _toes(robot: Robot, features: Array) -> Array:
     """Returns toes relative to the ground under the trunk in H, (B, T, 4, 3)."""
     level = np.zeros((*features.shape[:-1], 3))
     q = positions(robot, features, level)
-    p_BF = toe_positions(robot, q[..., 7:])
+    p_BF = robot.toe_positions(q[..., 7:])
     return quat_rotate(q[..., None, :4], p_BF) + q[..., None, 4:7]
 
 
@@ -136,7 +135,7 @@ def _move_toes(robot: Robot, q: Array, offset: Array) -> Array:
     Where a leg cannot be folded far enough for that, the base is raised.
     """
     q_WB, p_WB = q[..., None, :4], q[..., None, 4:7]
-    p_WF = quat_rotate(q_WB, toe_positions(robot, q[..., 7:])) + p_WB + offset
+    p_WF = quat_rotate(q_WB, robot.toe_positions(q[..., 7:])) + p_WB + offset
     p_WF[..., 2] = np.maximum(p_WF[..., 2], robot.foot_radius)
     joints, reached = _reach(robot, q_WB, p_WB, p_WF)
     sunk = np.maximum(robot.foot_radius - reached[..., 2], 0.0).max(axis=-1)
@@ -149,6 +148,5 @@ def _move_toes(robot: Robot, q: Array, offset: Array) -> Array:
 
 def _reach(robot: Robot, q_WB: Array, p_WB: Array, p_WF: Array) -> tuple[Array, Array]:
     """Returns joints within their limits, and where the toes are then."""
-    joints = leg_joints(robot, quat_rotate(quat_conjugate(q_WB), p_WF - p_WB))
-    joints = np.clip(joints, robot.joint_lower, robot.joint_upper)
-    return joints, quat_rotate(q_WB, toe_positions(robot, joints)) + p_WB
+    joints = robot.nearest_joints(quat_rotate(quat_conjugate(q_WB), p_WF - p_WB))
+    return joints, quat_rotate(q_WB, robot.toe_positions(joints)) + p_WB

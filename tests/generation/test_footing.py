@@ -4,7 +4,6 @@ import pytest
 from loco_drake.common.rotations import quat_rotate
 from loco_drake.generation import features as ft
 from loco_drake.generation.footing import start_footing, step_footing
-from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import get_robot
 
 GO2 = get_robot("go2")
@@ -12,7 +11,7 @@ ORIGIN = np.zeros((1, 3))
 
 
 def toes_of(q):
-    p_BF = toe_positions(GO2, q[..., 7:])
+    p_BF = GO2.toe_positions(q[..., 7:])
     return quat_rotate(q[..., None, :4], p_BF) + q[..., None, 4:7]
 
 

@@ -76,13 +76,12 @@ def test_toes_in_torch_agree_with_numpy_kinematics(make_synthetic):
 
     from loco_drake.common.rotations import quat_rotate
     from loco_drake.generation.toes import Toes
-    from loco_drake.models.kinematics import toe_positions
 
     motion = make_synthetic("dog-pace", 1.0, 0.7, 0.0)
     features = ft.motion_features(GO2, motion)
     features[:, ft.ROLL_PITCH] = [0.2, -0.3]
     q = ft.positions(GO2, features, np.zeros((len(motion), 3)))
-    expected = quat_rotate(q[:, None, :4], toe_positions(GO2, q[:, 7:]))
+    expected = quat_rotate(q[:, None, :4], GO2.toe_positions(q[:, 7:]))
     expected += q[:, None, 4:7]
     toes = Toes([get_robot("a1"), GO2])
     batch = torch.tensor(features[None], dtype=torch.float32)

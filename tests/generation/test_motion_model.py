@@ -16,7 +16,6 @@ from loco_drake.generation.tokenizer import (
     Tokenizer,
     save_tokenizer,
 )
-from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gait_schedule import parse_schedule
 from loco_drake.motion.gaits import LABELS, parse_label
@@ -147,7 +146,7 @@ def test_soles_stay_above_the_ground(model):
     robot = get_robot("go2")
     _, parts = run(model, 3)
     q = joined(parts, "q")
-    p_WF = quat_rotate(q[:, :, None, :4], toe_positions(robot, q[..., 7:]))
+    p_WF = quat_rotate(q[:, :, None, :4], robot.toe_positions(q[..., 7:]))
     lowest = (p_WF + q[:, :, None, 4:7])[..., 2] - robot.foot_radius
     # Where a leg is long enough to lift it, which wild motion need not be.
     assert np.median(lowest) >= -1e-9

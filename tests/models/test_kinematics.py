@@ -4,7 +4,6 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
 
-from loco_drake.models.kinematics import leg_joints, toe_jacobians, toe_positions
 from loco_drake.models.legs import (
     MIRROR_JOINT_SIGNS,
     MIRROR_JOINTS,
@@ -38,7 +37,7 @@ def plant(robot):
 def test_toe_positions_are_the_plants(robot, joints, plant):
     context = plant.CreateDefaultContext()
     base = plant.GetFrameByName("base")
-    for row, p_BF in zip(joints, toe_positions(robot, joints), strict=True):
+    for row, p_BF in zip(joints, robot.toe_positions(joints), strict=True):
         plant.SetPositions(context, [1, 0, 0, 0, 0, 0, 0, *row])
         for leg, p in zip(LEGS, p_BF, strict=True):
             X_BF = plant.GetFrameByName(f"{leg}_foot").CalcPose(context, base)
@@ -48,7 +47,7 @@ def test_toe_positions_are_the_plants(robot, joints, plant):
 def test_toe_jacobians_are_the_plants(robot, joints, plant):
     context = plant.CreateDefaultContext()
     base = plant.GetFrameByName("base")
-    for row, J in zip(joints, toe_jacobians(robot, joints), strict=True):
+    for row, J in zip(joints, robot.toe_jacobians(joints), strict=True):
         plant.SetPositions(context, [1, 0, 0, 0, 0, 0, 0, *row])
         for k, leg in enumerate(LEGS):
             expected = plant.CalcJacobianTranslationalVelocity(
@@ -65,12 +64,12 @@ def test_toe_jacobians_are_the_plants(robot, joints, plant):
 
 def test_toe_jacobians_are_the_derivative_of_toe_positions(robot, joints):
     """Central differences of 1e-6 rad, of which the error is about 1e-10 m/rad."""
-    J = toe_jacobians(robot, joints)
+    J = robot.toe_jacobians(joints)
     for k in range(3):
         step = np.zeros(12)
         step[k::3] = 1e-6
-        difference = toe_positions(robot, joints + step) - toe_positions(
-            robot, joints - step
+        difference = robot.toe_positions(joints + step) - robot.toe_positions(
+            joints - step
         )
         np.testing.assert_allclose(J[..., k], difference / 2e-6, atol=1e-8)
 
@@ -87,7 +86,7 @@ def test_leg_joints_invert_toe_positions(robot):
     joints = joints[(below > 0.02).all(axis=1)]
     assert len(joints) > 200
     np.testing.assert_allclose(
-        leg_joints(robot, toe_positions(robot, joints)), joints, atol=1e-9
+        robot.leg_joints(robot.toe_positions(joints)), joints, atol=1e-9
     )
 
 
@@ -96,26 +95,26 @@ def test_leg_joints_invert_toe_positions(robot):
 )
 def test_out_of_reach_leg_points_at_the_target(robot, scale, limit):
     """Too far or too near: the calf is at its limit and the toe on the target's ray."""
-    stance = toe_positions(robot, robot.stand_joints)
+    stance = robot.toe_positions(robot.stand_joints)
     thigh = robot.p_BHip + robot.abduction_offset[:, None] * [0, 1, 0]
     target = thigh + scale * (stance - thigh)
-    joints = leg_joints(robot, target)
+    joints = robot.leg_joints(target)
     np.testing.assert_array_equal(joints[2::3], getattr(robot, limit)[2::3])
-    ray = toe_positions(robot, joints) - thigh
+    ray = robot.toe_positions(joints) - thigh
     ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
     np.testing.assert_allclose(ray, np.tile([0, 0, -1], (4, 1)), atol=1e-12)
 
 
 def test_target_inside_the_hips_reach_is_finite(robot):
     """Nearer to the hip's axis than the thigh's offset no leg can get: no NaN."""
-    assert np.isfinite(leg_joints(robot, robot.p_BHip + 1e-3)).all()
+    assert np.isfinite(robot.leg_joints(robot.p_BHip + 1e-3)).all()
 
 
 def test_mirrored_joints_have_mirrored_toes(robot, joints):
     mirrored = joints[:, MIRROR_JOINTS] * MIRROR_JOINT_SIGNS
     np.testing.assert_allclose(
-        toe_positions(robot, mirrored),
-        toe_positions(robot, joints)[:, MIRROR_LEGS] * MIRROR_POLAR,
+        robot.toe_positions(mirrored),
+        robot.toe_positions(joints)[:, MIRROR_LEGS] * MIRROR_POLAR,
         atol=1e-15,
     )
 
@@ -123,11 +122,11 @@ def test_mirrored_joints_have_mirrored_toes(robot, joints):
 def test_leading_shapes(robot, joints):
     """One frame, a row of frames and a block of frames give the same numbers."""
     block = joints.reshape(5, 8, 12)
-    p_BF = toe_positions(robot, block)
+    p_BF = robot.toe_positions(block)
     assert p_BF.shape == (5, 8, 4, 3)
-    assert toe_jacobians(robot, block).shape == (5, 8, 4, 3, 3)
-    assert leg_joints(robot, p_BF).shape == (5, 8, 12)
-    np.testing.assert_array_equal(toe_positions(robot, joints[9]), p_BF[1, 1])
+    assert robot.toe_jacobians(block).shape == (5, 8, 4, 3, 3)
+    assert robot.leg_joints(p_BF).shape == (5, 8, 12)
+    np.testing.assert_array_equal(robot.toe_positions(joints[9]), p_BF[1, 1])
     np.testing.assert_array_equal(
-        leg_joints(robot, p_BF[1, 1]), leg_joints(robot, p_BF)[1, 1]
+        robot.leg_joints(p_BF[1, 1]), robot.leg_joints(p_BF)[1, 1]
     )

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import ROBOTS, get_robot
 from loco_drake.models.trot import trot_joints
 
@@ -13,9 +12,7 @@ def test_trot_is_periodic_and_diagonal(name):
     times = np.arange(0.0, 3.0, 0.02)
     joints = trot_joints(robot, times)
     np.testing.assert_allclose(joints[50:100], joints[75:125], atol=1e-12)
-    x = (toe_positions(robot, joints) - toe_positions(robot, robot.stand_joints))[
-        ..., 0
-    ]
+    x = (robot.toe_positions(joints) - robot.toe_positions(robot.stand_joints))[..., 0]
     assert np.corrcoef(x[50:, 0], x[50:, 3])[0, 1] > 0.9
     assert np.corrcoef(x[50:, 0], x[50:, 1])[0, 1] < -0.5
 

@@ -6,7 +6,6 @@ import pytest
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import quat_rotate
-from loco_drake.models.kinematics import toe_positions
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion import UNITS, load_motion, make_motion, save_motion
 from tests.synthetic_motion import synthetic_motion
@@ -53,7 +52,7 @@ def test_mirroring_reflects_every_toe_in_the_plane_y_0(motion):
     robot = get_robot("go2")
 
     def toes(m):
-        p_BF = toe_positions(robot, m.joint_positions)
+        p_BF = robot.toe_positions(m.joint_positions)
         return m.base_position[:, None] + quat_rotate(m.base_quaternion[:, None], p_BF)
 
     mirror = motion.mirrored()

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from loco_drake.models.kinematics import leg_joints
 from loco_drake.motion.motion import FPS
 from loco_drake.retargeting.retarget import within_reach
 from loco_drake.retargeting.scaling import Targets
@@ -25,8 +24,8 @@ def standing(robot, height, ahead=0.0, frames=100):
 
 def knee_heights(robot, targets):
     """Heights of the knees of a level trunk: the thigh hangs down by l1 cos b."""
-    thighs = leg_joints(robot, targets.p_BF)[:, 1::3]
-    hips = leg_joints(robot, targets.p_BF)[:, 0::3]
+    thighs = robot.leg_joints(targets.p_BF)[:, 1::3]
+    hips = robot.leg_joints(targets.p_BF)[:, 0::3]
     down = robot.thigh_length * np.cos(thighs) * np.cos(hips)
     side = robot.abduction_offset * np.sin(hips)
     return targets.p_WB[:, 2:] - down + side
