@@ -214,7 +214,7 @@ def test_robots_of_a_batch_share_a_diagram_but_no_state(plans):
 def test_reset_noise_moves_and_turns_the_robot_as_a_whole(plans):
     """Turned by psi about z, velocities with it; joints and heights as they were."""
     noise = ResetNoise(joints=0, velocities=0, position=0.5, heading=0.5)
-    state = plans[0].state[20]
+    state = plans[0].state[20].copy()
     near = noise.draw(state, np.random.default_rng(0))
     psi = yaw_of(near[:4]) - yaw_of(state[:4])
     assert abs(psi) > 0.01
