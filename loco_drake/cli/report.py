@@ -8,9 +8,11 @@ from rich.console import Console
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.common.files import atomic_path
-from loco_drake.evaluation.report.build import DEFAULT_REPLAYS, build_report
+from loco_drake.evaluation.report.page import build_report
 from loco_drake.evaluation.report.results import results_dir
 from loco_drake.generation.generate import check_duration
+
+DEFAULT_REPLAYS = ("dog-trot", "horse-trot", "mpc-bound", "solo8-walk")
 
 
 @dataclass(kw_only=True)
@@ -61,7 +63,8 @@ class Report:
             "missing": report.missing,
             "replays": [f"{robot} {label}" for robot, label in report.replays],
             "reason": {
-                f"replays of {robot}": why for robot, why in report.unavailable.items()
+                f"{robot} in {file}": why
+                for (file, robot), why in report.absent.items()
             },
         }
         write_json(self.json, figures)

@@ -34,25 +34,41 @@ _TITLES = {
 
 def confusion_figure(recognition: Recognition, title: str) -> Figure:
     """Returns three confusion matrices: what each gait (row) was taken for."""
-    names = [str(LABELS[label]) for label in recognition.labels]
+    labels = [str(LABELS[label]) for label in recognition.labels]
     figure = Figure(figsize=(15, 6.6), layout="constrained")
     figure.suptitle(title)
     columns = figure.subplots(1, len(_TITLES))
-    for column, (row, what) in enumerate(_TITLES.items()):
-        axes = columns[column]
-        matrix = recognition.confusion[row]
-        axes.imshow(matrix, vmin=0, vmax=1, cmap="Blues")
-        for (i, j), share in np.ndenumerate(matrix):
-            if share >= 0.005:
-                color = "w" if share > 0.5 else "k"
-                text = f"{100 * share:.0f}"
-                axes.text(j, i, text, ha="center", va="center", color=color, size=6)
-        accuracy = recognition.accuracies[row]["all"].mean
-        axes.set_title(f"{what}: {accuracy:.3f}")
-        axes.set_xticks(range(len(names)), names, rotation=90, size=7)
-        axes.set_yticks(range(len(names)), names if column == 0 else [], size=7)
-        axes.set_xlabel("taken for [%]")
+    for place, (axes, (row, what)) in enumerate(
+        zip(columns, _TITLES.items(), strict=True)
+    ):
+        draw_confusion(axes, recognition.confusion[row], labels, names=place == 0)
+        axes.set_title(f"{what}: {recognition.accuracies[row]['all'].mean:.3f}")
     return figure
+
+
+def draw_confusion(
+    axes: Axes, matrix: Array, labels: Sequence[str], *, names: bool
+) -> None:
+    """Draws the shares, shape (labels, labels), of each row that were taken for what.
+
+    Args:
+        axes: to draw in.
+        matrix: the shares.
+        labels: of rows and columns.
+        names: whether to write the rows' labels, too.
+    """
+    count = len(labels)
+    for (row, column), share in np.ndenumerate(matrix):
+        if share >= 0.005:
+            color = "#1f9d6b" if row == column else "#d9340d"
+            alpha = 0.25 + 0.75 * share
+            axes.bar(column, 0.92, 0.92, row - 0.46, color=color, alpha=alpha)
+            text = f"{100 * share:.0f}"
+            axes.text(column, row, text, ha="center", va="center", size=6)
+    axes.set(xlim=(-0.6, count - 0.4), ylim=(count - 0.4, -0.6), aspect="equal")
+    axes.set_xticks(range(count), labels, rotation=90, size=7)
+    axes.set_yticks(range(count), labels if names else [""] * count, size=7)
+    axes.set_xlabel("taken for, %", size=8)
 
 
 def code_use_figure(counts: NDArray[np.int64], title: str) -> Figure:

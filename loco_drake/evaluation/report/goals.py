@@ -1,301 +1,137 @@
-"""The numbers to reach: what is best known, the aim, and beyond."""
+"""The goals beside what was measured."""
 
-from math import degrees, inf
+from dataclasses import dataclass, replace
+from math import inf
 
-from loco_drake.evaluation.report.goal import Goal
-from loco_drake.evaluation.report.measures import (
-    LEAST_RETURN,
-    LEAST_WORST_RETURN,
-    estimate,
-    plain,
-    retargeted_slip,
-    tracking,
-    training_hours,
-    training_steps,
-    worst_gait,
-)
+from loco_drake.evaluation.report.content import CONTENT, Bound, Figure, Goal
+from loco_drake.evaluation.report.results import Figures, Results
+from loco_drake.models.robots import ROBOTS
 
-_RETARGETING = "Retargeting"
-_TOKENIZER = "Tokenizer"
-_GENERATION = "Generated motion"
-_TRACKING = "Tracking of generated motion"
-_LEARNING = "Learning"
+MET, BEST, MISSED, UNKNOWN = "met", "dream met", "missed", "not measured"
 
-GOALS = (
-    Goal(
-        _RETARGETING,
-        "slip of feet in stance, median",
-        "m/s",
-        "paper's clips .087",
-        "≤ .03, targets moved by ≤ 30 mm RMS",
-        retargeted_slip,
-        high=0.03,
-        dream=("≤ .01", -inf, 0.01),
-        digits=4,
-    ),
-    Goal(
-        _RETARGETING,
-        "deepest toe below ground",
-        "mm",
-        "paper's clips 20; 2.1 if each is lifted",
-        "≤ 2",
-        plain("retargeting", "all", "penetration_max_m", factor=1000),
-        high=2.0,
-        dream=("≤ 1", -inf, 1.0),
-        digits=2,
-    ),
-    Goal(
-        _RETARGETING,
-        "joint angles beyond their limits",
-        "frames",
-        "paper's clips 0",
-        "0",
-        plain("retargeting", "all", "joint_limit_violations"),
-        high=0.0,
-        digits=0,
-    ),
-    Goal(
-        _RETARGETING,
-        "joint speed over its limit, worst",
-        "ratio",
-        "paper's clips 1.27",
-        "≤ 1",
-        plain("retargeting", "all", "joint_speed_ratio_max"),
-        high=1.0,
-        digits=2,
-    ),
-    Goal(
-        _RETARGETING,
-        "speed on one core",
-        "frames/s",
-        "35 to 70 (GMR, humanoids)",
-        "≥ 300",
-        plain("retargeting", "frames_per_second"),
-        low=300.0,
-        dream=("≥ 1000", 1000.0, inf),
-        digits=0,
-    ),
-    Goal(
-        _TOKENIZER,
-        "joint error, recordings held out",
-        "rad RMS",
-        "not published",
-        "≤ .03",
-        plain("tokenizer", "all", "joint_rmse_rad"),
-        high=0.03,
-        dream=("≤ .015", -inf, 0.015),
-        digits=4,
-    ),
-    Goal(
-        _TOKENIZER,
-        "toe error, recordings held out",
-        "mm RMS",
-        "not published",
-        "≤ 15",
-        plain("tokenizer", "all", "toe_error_rmse_m", factor=1000),
-        high=15.0,
-        dream=("≤ 7", -inf, 7.0),
-        digits=1,
-    ),
-    Goal(
-        _TOKENIZER,
-        "codes in use",
-        "%",
-        "76 (best stated, of 2048 codes)",
-        "≥ 90",
-        plain("tokenizer", "codebook_use", factor=100),
-        low=90.0,
-        dream=("100", 100.0, inf),
-        digits=1,
-    ),
-    Goal(
-        _TOKENIZER,
-        "motion decoded for the other robot, joint error",
-        "rad RMS",
-        "not published",
-        "≤ .06",
-        plain("generation", "transfer_joint_rmse_rad"),
-        high=0.06,
-        dream=("≤ .03", -inf, 0.03),
-    ),
-    Goal(
-        _GENERATION,
-        "quality, transformer",
-        "share",
-        "paper .736",
-        "≥ .95",
-        estimate("classifiers", "transformer", "real_to_generated", "all"),
-        low=0.95,
-        dream=("≥ .99", 0.99, inf),
-    ),
-    Goal(
-        _GENERATION,
-        "quality, linear",
-        "share",
-        "paper's clips .997",
-        "≥ .97",
-        estimate("classifiers", "linear", "real_to_generated", "all"),
-        low=0.97,
-        dream=("≥ .99", 0.99, inf),
-    ),
-    Goal(
-        _GENERATION,
-        "diversity over recorded → recorded, transformer",
-        "ratio",
-        "paper .893",
-        "≥ .97",
-        plain("generation", "classifiers", "transformer", "diversity_over_real"),
-        low=0.97,
-        dream=("≥ 1", 1.0, inf),
-    ),
-    Goal(
-        _GENERATION,
-        "told from recordings by a linear classifier",
-        "share",
-        "paper's clips .852; chance .5",
-        "≤ .65",
-        estimate("two_sample_accuracy"),
-        high=0.65,
-        dream=("≤ .55", -inf, 0.55),
-    ),
-    Goal(
-        _GENERATION,
-        "slip of feet in stance, median",
-        "m/s",
-        "paper's clips .330",
-        "≤ .06",
-        plain("generation", "all", "stance_slip_median_mps"),
-        high=0.06,
-        dream=("≤ .03", -inf, 0.03),
-        digits=4,
-    ),
-    Goal(
-        _GENERATION,
-        "joints' jerk over that of recordings",
-        "ratio",
-        "paper's clips .94 to 2.04, by source",
-        ".9 to 1.1",
-        plain("generation", "all", "jerk_ratio"),
-        low=0.9,
-        high=1.1,
-        digits=2,
-    ),
-    Goal(
-        _GENERATION,
-        "drift over 60 s, over what two motions differ by",
-        "ratio",
-        "motion ends after 4 s",
-        "≤ 1",
-        plain("generation", "drift_60s"),
-        high=1.0,
-        digits=2,
-    ),
-    Goal(
-        _TRACKING,
-        "normalized return, mean of all gaits",
-        "of 100",
-        "“close to 100”, with joint errors over π; 98.5 (DeepMimic, walk)",
-        "≥ 90",
-        tracking("normalized_return"),
-        low=LEAST_RETURN,
-        dream=("≥ 95", 95.0, inf),
-        digits=1,
-    ),
-    Goal(
-        _TRACKING,
-        "normalized return, worst gait",
-        "of 100",
-        "not published",
-        "≥ 80",
-        worst_gait,
-        low=LEAST_WORST_RETURN,
-        dream=("≥ 90", 90.0, inf),
-        digits=1,
-    ),
-    Goal(
-        _TRACKING,
-        "episodes that end in a fall",
-        "%",
-        "2.4 without success (Uni-Mo)",
-        "≤ 2 of 10 s each",
-        tracking("fall_rate", factor=100),
-        high=2.0,
-        dream=("≤ .1", -inf, 0.1),
-        digits=1,
-    ),
-    Goal(
-        _TRACKING,
-        "joint error of the robot",
-        "° RMS",
-        "3.4 (Uni-Mo)",
-        "≤ 2.4",
-        tracking("joint_rmse_rad", factor=degrees(1)),
-        high=2.4,
-        dream=("≤ 1.2", -inf, 1.2),
-        digits=1,
-    ),
-    Goal(
-        _TRACKING,
-        "position error of the base",
-        "cm RMS",
-        "3.8 (Uni-Mo)",
-        "≤ 3.8",
-        tracking("base_position_rmse_m", factor=100),
-        high=3.8,
-        dream=("≤ 1.9", -inf, 1.9),
-        digits=1,
-    ),
-    Goal(
-        _TRACKING,
-        "orientation error of the base",
-        "° RMS",
-        "2.7 (Uni-Mo)",
-        "≤ 2.7",
-        tracking("base_orientation_rmse_rad", factor=degrees(1)),
-        high=2.7,
-        dream=("≤ 1.4", -inf, 1.4),
-        digits=1,
-    ),
-    Goal(
-        _TRACKING,
-        "stretch by the smoother, mean",
-        "ratio",
-        "not published",
-        "≤ 1.05",
-        plain("tracking-generated", "all", "stretch"),
-        high=1.05,
-        dream=("≤ 1.01", -inf, 1.01),
-    ),
-    Goal(
-        _TRACKING,
-        "whole diagram on one core",
-        "× real time",
-        "not published",
-        "≥ 3",
-        plain("tracking-generated", "real_time_factor"),
-        low=3.0,
-        dream=("≥ 10", 10.0, inf),
-        digits=1,
-    ),
-    Goal(
-        _LEARNING,
-        "steps of training to a return of 90",
-        "million",
-        "1000 (paper); 98 for each clip (Kine2Go)",
-        "≤ 20",
-        training_steps,
-        high=20.0,
-        dream=("≤ 5", -inf, 5.0),
-        digits=1,
-    ),
-    Goal(
-        _LEARNING,
-        "time of training, two processes",
-        "h",
-        "a GPU, time not published",
-        "hours (< 24)",
-        training_hours,
-        high=24.0,
-        digits=1,
-    ),
-)
+
+@dataclass(frozen=True)
+class Measured:
+    """A measured figure, in the unit of its goal.
+
+    Attributes:
+        value: the figure.
+        low: of its 95 % interval, if there is one.
+        high: of the same.
+        notes: what it was bought with, or where it was found, in words.
+        paid: False if the price is above what the goal allows.
+    """
+
+    value: float
+    low: float | None = None
+    high: float | None = None
+    notes: tuple[str, ...] = ()
+    paid: bool = True
+
+
+@dataclass(frozen=True)
+class Line:
+    """A goal; what each robot reached, and the verdict, in the order of ROBOTS."""
+
+    goal: Goal
+    measured: tuple[Measured | None, ...]
+
+    @property
+    def verdicts(self) -> list[str]:
+        """MET, BEST (the dream too), MISSED or UNKNOWN for each robot.
+
+        The mean decides, not its interval; a figure whose price is too high misses.
+        """
+        return [_verdict(self.goal, measured) for measured in self.measured]
+
+
+def _verdict(goal: Goal, measured: Measured | None) -> str:
+    if measured is None:
+        return UNKNOWN
+    if not measured.paid or measured.value not in goal.aim:
+        return MISSED
+    return BEST if goal.dream and measured.value in goal.dream else MET
+
+
+def scoreboard(results: Results) -> dict[str, list[Line]]:
+    """Returns all goals by part of the pipeline, with what was measured."""
+    return {
+        part: [
+            Line(goal, tuple(measure(goal, results, r) for r in ROBOTS)) for goal in own
+        ]
+        for part, own in CONTENT.goals.items()
+    }
+
+
+def counts(parts: dict[str, list[Line]]) -> dict[str, dict[str, int]]:
+    """Returns how many goals each robot met, and how many were measured."""
+    lines = [line.verdicts for part in parts.values() for line in part]
+    return {
+        robot: {
+            "met": sum(verdict in (MET, BEST) for verdict in verdicts),
+            "measured": sum(verdict != UNKNOWN for verdict in verdicts),
+            "goals": len(verdicts),
+        }
+        for robot, verdicts in zip(ROBOTS, zip(*lines, strict=True), strict=True)
+    }
+
+
+def measure(goal: Goal, results: Results, robot: str) -> Measured | None:
+    """Returns the figure of a goal, None where it was not measured.
+
+    Raises:
+        InputError: if a result is damaged.
+    """
+    found = _read(goal.figure, results, robot, highest=goal.aim.least == -inf)
+    if found is None or goal.price is None:
+        return found
+    price = goal.price
+    figure = Figure(price.file or goal.figure.file, price.path, price.factor)
+    paid = _read(figure, results, robot)
+    if paid is None:
+        note = f"{price.text.partition(' {')[0]} not measured"
+        within = price.bound == Bound()
+    else:
+        note = price.text.format(paid.value)
+        within = paid.value in price.bound
+    return replace(found, notes=(*found.notes, note), paid=within)
+
+
+def _read(
+    figure: Figure, results: Results, robot: str, *, highest: bool = False
+) -> Measured | None:
+    """Returns the figure, where ``*`` stands for the label with the worst."""
+    within = results.of(figure.file, robot)
+    if within is None:
+        return None
+    *path, last = figure.path.split(".")
+    if "*" in path:
+        labels = within.parts(*path[: path.index("*")])
+        found = [
+            (v, name) for name, part in labels if (v := part.required(last)) is not None
+        ]
+        if not found:
+            return None
+        value, name = max(found) if highest else min(found)
+        return Measured(figure.factor * value, notes=(name,))
+    if last.endswith("[-1]"):
+        values = within.numbers(*path, last.removesuffix("[-1]"))
+        ended = values[-1] if values else None
+        return None if ended is None else Measured(figure.factor * ended)
+    if last == "mean":
+        return read_estimate(within, *path)
+    number = within.part(*path).required(last)
+    return None if number is None else Measured(figure.factor * number)
+
+
+def read_estimate(figures: Figures, *keys: str) -> Measured | None:
+    """Returns the estimate ``{mean, low, high}`` under ``keys``; None if it is null."""
+    *path, last = keys
+    within = figures.part(*path)
+    if within.values.get(last) is None:
+        return None
+    found = within.part(last)
+    mean = found.required("mean")
+    if mean is None:
+        return None
+    return Measured(mean, found.required("low"), found.required("high"))

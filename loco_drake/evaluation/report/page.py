@@ -1,111 +1,118 @@
-"""The page: all parts of the report in one HTML file that needs nothing else."""
+"""From a folder of results to a page: one HTML file that needs nothing else."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from loco_drake import __version__
-from loco_drake.evaluation.report import pictures, sections, table_one
-from loco_drake.evaluation.report.commands import commands
-from loco_drake.evaluation.report.expected import CONDITIONS
-from loco_drake.evaluation.report.networks import networks_table
-from loco_drake.evaluation.report.replays import Replay, share_pieces
-from loco_drake.evaluation.report.results import Results
-from loco_drake.evaluation.report.scoreboard import Line
-from loco_drake.evaluation.report.words import robot_title
-from loco_drake.models.robots import ROBOTS
+from loco_drake.common.errors import check_choice
+from loco_drake.control.actor import load_actor
+from loco_drake.evaluation.report import pictures
+from loco_drake.evaluation.report.content import CONTENT
+from loco_drake.evaluation.report.goals import counts, scoreboard
+from loco_drake.evaluation.report.replays import Replay, record_replays, share_pieces
+from loco_drake.evaluation.report.results import Results, commands, load_results
+from loco_drake.evaluation.report.sections import all_tables, networks_table
+from loco_drake.evaluation.report.tables import figure_cell, robot_title
+from loco_drake.generation.generate import generate_motion
+from loco_drake.generation.motion_model import pretrained_motion_model
+from loco_drake.models.robots import ROBOTS, get_robot
+from loco_drake.models.shipped import policy_path
+from loco_drake.motion.gaits import parse_label
 from loco_drake.motion.motion import Motion
 
+STRIP_SECONDS = 1.0  # of motion for an outline; a little more than is shown
 
-def render(
-    results: Results,
-    goals: dict[str, list[Line]],
-    counts: dict[str, dict[str, int]],
-    motions: Mapping[str, Sequence[Motion]],
-    replays: Sequence[Replay],
-    unavailable: Mapping[str, str],
-) -> str:
-    """Returns the page.
+
+@dataclass(frozen=True)
+class Page:
+    """A finished page.
+
+    Attributes:
+        html: the page.
+        counts: of goals, by robot.
+        missing: results that are missing by file, with the command that makes each.
+        absent: file and robot of figures that a file does not have, and why.
+        replays: robot and gait of each replay.
+    """
+
+    html: str
+    counts: dict[str, dict[str, int]]
+    missing: dict[str, str]
+    absent: dict[tuple[str, str], str]
+    replays: list[tuple[str, str]]
+
+
+def build_report(
+    folder: Path,
+    labels: Sequence[str],
+    seconds: float,
+    seed: int,
+    say: Callable[[str], None] = lambda text: None,
+) -> Page:
+    """Returns the page of a folder of results.
 
     Args:
-        results: of the ``evaluate`` commands.
-        goals: of :func:`.scoreboard.scoreboard`.
-        counts: of :func:`.scoreboard.counts`.
-        motions: generated, of each robot, one for each gait.
-        replays: to embed.
-        unavailable: robots without replays, and why.
+        folder: as :func:`.results.load_results` reads it.
+        labels: of the replays, for each robot; may be empty.
+        seconds: of each replay.
+        seed: of the motion shown.
+        say: is told what goes on.
 
     Raises:
-        InputError: if a result is damaged.
+        InputError: if a result is damaged, or a label is unknown.
     """
-    environment = Environment(
-        loader=PackageLoader("loco_drake.evaluation.report"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
-    environment.globals.update(robot_title=robot_title)
-    page = environment.get_template("page.html")
-    return page.render(
-        version=__version__,
-        robots=ROBOTS,
-        goals=goals,
-        counts=counts,
-        missing=results.missing,
+    for label in labels:
+        parse_label(label)
+    results = load_results(folder)
+    shown = of_results(results)
+    for name in ROBOTS:
+        trained = load_actor(
+            policy_path(get_robot(name)), get_robot(name)
+        ).config.labels
+        for label in labels:
+            check_choice(f"gait of the {name}'s policy", label, trained)
+    say("Generating motion of each gait")
+    motions = {robot: _motions(robot, seed) for robot in ROBOTS}
+    replays: list[Replay] = []
+    for robot in ROBOTS if labels else ():
+        for replay in record_replays(robot, labels, seconds, seed):
+            say(f"Simulated {robot}, {replay.label}")
+            replays.append(replay)
+    return Page(
+        html=_render(shown, motions, replays),
+        counts=shown["counts"],
+        missing={file.path: file.command for file in results.missing},
         absent=results.absent,
-        found=results.found,
-        commands=commands(results),
-        conditions=CONDITIONS,
-        gaits=pictures.gaits_picture(motions),
-        gait_count=len(next(iter(motions.values()))),
-        networks=networks_table(),
-        replays=replays,
-        replay_data=share_pieces([replay.html for replay in replays]),
-        unavailable=unavailable,
-        **tables(results),
-        **drawings(results),
+        replays=[(replay.robot, replay.label) for replay in replays],
     )
 
 
-def tables(results: Results) -> dict[str, Any]:
-    """Returns the tables of what results there are, by name; None of others.
+def of_results(results: Results) -> dict[str, Any]:
+    """Returns all that the page shows of results, by name.
 
     Raises:
         InputError: if a result is damaged.
     """
-    generation = sections.of_robots(results, "generation")
-    robustness = sections.robustness_table(results)
-    policies = sections.policies_table(results)
-    return {
-        "retargeting": sections.retargeting_tables(results),
-        "tokenizer": sections.tokenizer_tables(results),
-        "generation": sections.generation_tables(results),
-        "transformer": table_one.transformer_table(generation) if generation else None,
-        "linear": table_one.linear_table(generation) if generation else None,
-        "matched": table_one.matched_table(generation) if generation else None,
-        "realism": sections.realism_table(results) if generation else None,
-        "tracking": sections.tracking_tables(results),
-        "robustness": robustness if robustness.rows else None,
-        "policies": policies if policies.rows else None,
-    }
-
-
-def drawings(results: Results) -> dict[str, Any]:
-    """Returns the pictures of what results there are, by name; None of others.
-
-    Raises:
-        InputError: if a result is damaged.
-    """
-    generation = sections.of_robots(results, "generation")
-    tracking = sections.of_robots(results, "tracking-generated")
+    goals = scoreboard(results)
+    generation = results.of_robots("generation")
+    tracking = results.of_robots("tracking-generated")
     learning = {
         robot: figures
-        for robot, figures in sections.of_robots(results, "learning").items()
+        for robot, figures in results.of_robots("learning").items()
         if figures.numbers("learning", "steps")
     }
     return {
+        "goals": goals,
+        "counts": counts(goals),
+        "missing": results.missing,
+        "absent": results.absent,
+        "found": results.found,
+        "commands": commands(results),
+        **all_tables(results),
         "confusions": {
             robot: pictures.confusion_picture(figures, "transformer")
             for robot, figures in generation.items()
@@ -114,3 +121,36 @@ def drawings(results: Results) -> dict[str, Any]:
         "returns": pictures.returns_picture(tracking) if tracking else None,
         "learning": pictures.learning_picture(learning) if learning else None,
     }
+
+
+def _render(
+    shown: dict[str, Any],
+    motions: Mapping[str, Sequence[Motion]],
+    replays: Sequence[Replay],
+) -> str:
+    environment = Environment(
+        loader=PackageLoader("loco_drake.evaluation.report"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    environment.globals.update(robot_title=robot_title, figure_cell=figure_cell)
+    return environment.get_template("page.html").render(
+        version=__version__,
+        robots=ROBOTS,
+        conditions=CONTENT.conditions,
+        gaits=pictures.gaits_picture(motions),
+        gait_count=len(next(iter(motions.values()))),
+        networks=networks_table(),
+        replays=replays,
+        replay_data=share_pieces([replay.html for replay in replays]),
+        **shown,
+    )
+
+
+def _motions(robot: str, seed: int) -> list[Motion]:
+    """Returns a motion of each gait that the shipped generator knows."""
+    model = pretrained_motion_model(robot)
+    labels = map(parse_label, model.generator.config.labels)
+    return [generate_motion(model, label, STRIP_SECONDS, seed) for label in labels]

@@ -1,33 +1,95 @@
-"""The pictures of the report, each an SVG element."""
+"""The pictures of the report: SVG elements that take their ink from the page's text."""
 
-from collections.abc import Mapping, Sequence
+import io
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
+from html import escape
+from typing import Any, ParamSpec
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from loco_drake.evaluation.generation_pictures import draw_strip
-from loco_drake.evaluation.report.measures import LEAST_RETURN, LEAST_WORST_RETURN
+from loco_drake.evaluation.generation_pictures import draw_confusion, draw_strip
+from loco_drake.evaluation.report.content import CONTENT
 from loco_drake.evaluation.report.results import Figures
-from loco_drake.evaluation.report.svg import (
-    COLORS,
-    FAINT,
-    INK,
-    ROBOT_COLORS,
-    page_style,
-    to_svg,
-)
-from loco_drake.evaluation.report.words import robot_title
+from loco_drake.evaluation.report.tables import robot_title
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS, SOURCES
 from loco_drake.motion.motion import Motion
 
 Array = NDArray[np.float64]
 
+# Readable on white and on near-black, and by the colour-blind.
+COLORS = {
+    "dog": "#d9730d",
+    "horse": "#2e86c9",
+    "mpc": "#1f9d6b",
+    "solo8": "#b5569b",
+}
+ROBOT_COLORS = {"go2": "#2e86c9", "a1": "#d9730d"}
+
+# Stands for the colour of the page's text until the SVG is written.
+INK = "#010203"
+FAINT = "#808890"
+
 _TALL = 15.0  # of 100: bars that a number fits into
+_CONFUSIONS = {
+    "real_to_real": "recorded, by recorded",
+    "real_to_generated": "generated, by recorded",
+    "generated_to_real": "recorded, by generated",
+}
+# Lines among the returns: the goals that they are of.
+_AIMS = {
+    "aim, mean": "normalized return, mean of all gaits",
+    "aim, worst gait": "normalized return, worst gait",
+}
+_STYLE: dict[str, Any] = {
+    "axes.edgecolor": FAINT,
+    "axes.labelcolor": INK,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": 10,
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
+    "savefig.facecolor": "none",
+    "font.family": "sans-serif",
+    "font.size": 10,
+    "grid.color": FAINT,
+    "grid.alpha": 0.3,
+    "legend.frameon": False,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "loco_drake",
+    "text.color": INK,
+    "xtick.color": FAINT,
+    "xtick.labelcolor": INK,
+    "ytick.color": FAINT,
+    "ytick.labelcolor": INK,
+}
+_P = ParamSpec("_P")
 
 
-def gaits_picture(motions: Mapping[str, Sequence[Motion]]) -> str:
+def _as_svg(draw: Callable[_P, tuple[Figure, str]]) -> Callable[_P, str]:
+    """Makes an SVG element of a figure, in the page's style, and what it shows."""
+
+    @wraps(draw)
+    def drawn(*args: _P.args, **kwargs: _P.kwargs) -> str:
+        buffer = io.StringIO()
+        with mpl.rc_context(_STYLE):  # type: ignore[arg-type, unused-ignore]
+            figure, alt = draw(*args, **kwargs)
+            figure.savefig(buffer, format="svg", metadata={"Date": None})
+        text = buffer.getvalue()
+        text = text[text.index("<svg") :].replace(INK, "currentColor")
+        text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+        return text.replace("<svg ", f'<svg role="img" aria-label="{escape(alt)}" ', 1)
+
+    return drawn
+
+
+@_as_svg
+def gaits_picture(motions: Mapping[str, Sequence[Motion]]) -> tuple[Figure, str]:
     """Returns the outlines of robots in each gait, a row each (Figure 1).
 
     Args:
@@ -35,64 +97,63 @@ def gaits_picture(motions: Mapping[str, Sequence[Motion]]) -> str:
     """
     robots = list(motions)
     count = len(motions[robots[0]])
-    with page_style("gaits"):
-        figure = Figure(figsize=(11, 0.6 * count + 0.3), layout="constrained")
-        axes = figure.subplots(count, len(robots), squeeze=False)
-        for column, name in enumerate(robots):
-            axes[0, column].set_title(robot_title(name))
-            for row, motion in enumerate(motions[name]):
-                color = COLORS[motion.source]
-                cell = axes[row, column]
-                draw_strip(cell, get_robot(name), motion, near=(color, color), ink=INK)
-                cell.set_ylim(-0.03, 0.43)
-                if column == 0:
-                    cell.text(
-                        -0.01,
-                        0.4,
-                        str(motion.label),
-                        transform=cell.transAxes,
-                        ha="right",
-                        color=color,
-                        weight="bold",
-                    )
-        alt = (
-            f"Outlines of {' and '.join(robots)} every tenth of a second in "
-            f"{count} generated gaits, from "
-            f"{', '.join(dict.fromkeys(m.source for m in motions[robots[0]]))}."
-        )
-        return to_svg(figure, alt)
+    figure = Figure(figsize=(11, 0.6 * count + 0.3), layout="constrained")
+    axes = figure.subplots(count, len(robots), squeeze=False)
+    for column, name in enumerate(robots):
+        axes[0, column].set_title(robot_title(name))
+        for row, motion in enumerate(motions[name]):
+            color = COLORS[motion.source]
+            cell = axes[row, column]
+            draw_strip(cell, get_robot(name), motion, near=(color, color), ink=INK)
+            cell.set_ylim(-0.03, 0.43)
+            if column == 0:
+                cell.text(
+                    -0.01,
+                    0.4,
+                    str(motion.label),
+                    transform=cell.transAxes,
+                    ha="right",
+                    color=color,
+                    weight="bold",
+                )
+    alt = (
+        f"Outlines of {' and '.join(robots)} every tenth of a second in "
+        f"{count} generated gaits, from "
+        f"{', '.join(dict.fromkeys(m.source for m in motions[robots[0]]))}."
+    )
+    return figure, alt
 
 
-def learning_picture(curves: Mapping[str, Figures]) -> str:
+@_as_svg
+def learning_picture(curves: Mapping[str, Figures]) -> tuple[Figure, str]:
     """Returns how returns grew in training, by source (Figure 3).
 
     Args:
         curves: of each robot, with "learning".
     """
-    with page_style("learning"):
-        figure = Figure(figsize=(5.5 * len(curves), 3.8), layout="constrained")
-        axes = figure.subplots(1, len(curves), squeeze=False, sharey=True)[0]
-        ends = []
-        for cell, (robot, figures) in zip(axes, curves.items(), strict=True):
-            steps, by_source = _curves(figures)
-            for source, returns in by_source.items():
-                for values in returns:
-                    cell.plot(steps, values, color=COLORS[source], lw=0.8, alpha=0.35)
-                mean = _mean(returns)
-                cell.plot(steps, mean, color=COLORS[source], lw=2.2, label=source)
-                ends.append(f"{robot} {source} {mean[-1]:.0f}")
-            cell.axhline(100, color=FAINT, ls="--", lw=1)
-            cell.text(0, 101.5, "most that can be had", color=FAINT, size=8)
-            cell.set(xlabel="million steps of 20 ms", ylim=(0, 108), xlim=(0, None))
-            cell.set_title(robot_title(robot))
-            cell.grid(visible=True)
-            cell.legend(loc="lower right", ncols=2)
-        axes[0].set_ylabel("normalized return in training, of 100")
-        alt = (
-            "Learning curves: mean normalized return of each source's gaits against "
-            f"millions of steps; at the end {', '.join(ends)}."
-        )
-        return to_svg(figure, alt)
+    figure = Figure(figsize=(5.5 * len(curves), 3.8), layout="constrained")
+    axes = figure.subplots(1, len(curves), squeeze=False, sharey=True)[0]
+    ends = []
+    for cell, (robot, figures) in zip(axes, curves.items(), strict=True):
+        steps, by_source = _curves(figures)
+        for source, returns in by_source.items():
+            for values in returns:
+                cell.plot(steps, values, color=COLORS[source], lw=0.8, alpha=0.35)
+            mean = _mean(returns)
+            cell.plot(steps, mean, color=COLORS[source], lw=2.2, label=source)
+            ends.append(f"{robot} {source} {mean[-1]:.0f}")
+        cell.axhline(100, color=FAINT, ls="--", lw=1)
+        cell.text(0, 101.5, "most that can be had", color=FAINT, size=8)
+        cell.set(xlabel="million steps of 20 ms", ylim=(0, 108), xlim=(0, None))
+        cell.set_title(robot_title(robot))
+        cell.grid(visible=True)
+        cell.legend(loc="lower right", ncols=2)
+    axes[0].set_ylabel("normalized return in training, of 100")
+    alt = (
+        "Learning curves: mean normalized return of each source's gaits against "
+        f"millions of steps; at the end {', '.join(ends)}."
+    )
+    return figure, alt
 
 
 def _curves(figures: Figures) -> tuple[Array, dict[str, Array]]:
@@ -115,91 +176,80 @@ def _mean(values: Array) -> Array:
     return np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
 
 
-def returns_picture(tracking: Mapping[str, Figures]) -> str:
+@_as_svg
+def returns_picture(tracking: Mapping[str, Figures]) -> tuple[Figure, str]:
     """Returns the return of each gait, robot beside robot.
 
     Args:
         tracking: figures of each robot.
     """
     labels = [str(label) for label in LABELS]
-    with page_style("returns"):
-        figure = Figure(figsize=(11, 3.9), layout="constrained")
-        axes = figure.add_subplot()
-        width = 0.8 / len(tracking)
-        for place, (robot, figures) in enumerate(tracking.items()):
-            found = dict(figures.parts("labels"))
-            for x, label in enumerate(labels):
-                part = found.get(label)
-                value = part.required("normalized_return") if part else None
-                if part is None or value is None:
-                    continue
-                at = x + (place - (len(tracking) - 1) / 2) * width
-                axes.bar(at, value, 0.9 * width, color=ROBOT_COLORS[robot])
-                worst = part.number("normalized_return_worst")
-                if worst is not None:
-                    axes.plot([at], [worst], "_", color=INK, ms=9, mew=2)
-                high = value > _TALL
-                axes.text(
-                    at,
-                    2 if high else value + 1,
-                    f"{value:.0f}",
-                    ha="center",
-                    size=8,
-                    color="white" if high else INK,
-                )
-            name = robot_title(robot)
-            axes.bar([np.nan], [np.nan], color=ROBOT_COLORS[robot], label=name)
-        axes.plot([], [], "_", color=INK, ms=9, mew=2, label="worst episode")
-        for aim, what in (
-            (LEAST_RETURN, "aim, mean"),
-            (LEAST_WORST_RETURN, "aim, worst gait"),
-        ):
-            axes.axhline(aim, color=FAINT, ls="--", lw=1, zorder=0)
-            axes.text(len(labels) - 0.45, aim, what, va="bottom", color=FAINT, size=8)
-        axes.set_xticks(range(len(labels)), labels, rotation=35, ha="right")
-        axes.set(ylim=(0, 105), xlim=(-0.6, len(labels) + 0.9))
-        axes.set_ylabel("normalized return, of 100")
-        figure.legend(loc="outside upper right", ncols=3)
-        return to_svg(
-            figure, "Normalized return of each gait; the table has the values."
+    figure = Figure(figsize=(11, 3.9), layout="constrained")
+    axes = figure.add_subplot()
+    width = 0.8 / len(tracking)
+    for place, (robot, figures) in enumerate(tracking.items()):
+        found = dict(figures.parts("labels"))
+        for x, label in enumerate(labels):
+            part = found.get(label)
+            value = part.required("normalized_return") if part else None
+            if part is None or value is None:
+                continue
+            at = x + (place - (len(tracking) - 1) / 2) * width
+            axes.bar(at, value, 0.9 * width, color=ROBOT_COLORS[robot])
+            worst = part.number("normalized_return_worst")
+            if worst is not None:
+                axes.plot([at], [worst], "_", color=INK, ms=9, mew=2)
+            high = value > _TALL
+            axes.text(
+                at,
+                2 if high else value + 1,
+                f"{value:.0f}",
+                ha="center",
+                size=8,
+                color="white" if high else INK,
+            )
+        name = robot_title(robot)
+        axes.bar([np.nan], [np.nan], color=ROBOT_COLORS[robot], label=name)
+    axes.plot([], [], "_", color=INK, ms=9, mew=2, label="worst episode")
+    for what, title in _AIMS.items():
+        (aim,) = (
+            goal.aim.least
+            for goals in CONTENT.goals.values()
+            for goal in goals
+            if goal.title == title
         )
+        axes.axhline(aim, color=FAINT, ls="--", lw=1, zorder=0)
+        axes.text(len(labels) - 0.45, aim, what, va="bottom", color=FAINT, size=8)
+    axes.set_xticks(range(len(labels)), labels, rotation=35, ha="right")
+    axes.set(ylim=(0, 105), xlim=(-0.6, len(labels) + 0.9))
+    axes.set_ylabel("normalized return, of 100")
+    figure.legend(loc="outside upper right", ncols=3)
+    return figure, "Normalized return of each gait; the table has the values."
 
 
-def confusion_picture(figures: Figures, kind: str) -> str:
+@_as_svg
+def confusion_picture(figures: Figures, kind: str) -> tuple[Figure, str]:
     """Returns what generated and recorded gaits were taken for, as three matrices.
 
     Args:
         figures: of generation.
         kind: of classifier.
     """
-    matrices = (
-        ("real_to_real", "recorded, by recorded"),
-        ("real_to_generated", "generated, by recorded"),
-        ("generated_to_real", "recorded, by generated"),
+    labels = figures.part("confusion").values.get("labels")
+    known = [str(label) for label in LABELS]
+    if not isinstance(labels, list) or labels != [k for k in known if k in labels]:
+        raise figures.damaged("confusion.labels are no gaits")
+    within = figures.part("confusion", kind)
+    matrices = [within.matrix(key, len(labels)) for key in _CONFUSIONS]
+    figure = Figure(figsize=(11, 4.7), layout="constrained")
+    columns = figure.subplots(1, len(matrices))
+    for place, (axes, title) in enumerate(
+        zip(columns, _CONFUSIONS.values(), strict=True)
+    ):
+        draw_confusion(axes, matrices[place], labels, names=place == 0)
+        axes.set_title(title)
+    alt = (
+        f"Confusion matrices of the {kind} classifier over {len(labels)} gaits: "
+        "what each gait, a row, was taken for."
     )
-    labels = figures.part("confusion").strings("labels")
-    with page_style(f"confusion-{kind}-{figures.values.get('robot')}"):
-        figure = Figure(figsize=(11, 4.7), layout="constrained")
-        axes = figure.subplots(1, len(matrices))
-        within = figures.part("confusion", kind)
-        for place, (cell, (key, title)) in enumerate(zip(axes, matrices, strict=True)):
-            matrix = within.matrix(key, len(labels))
-            for (row, column), share in np.ndenumerate(matrix):
-                color = "#1f9d6b" if row == column else "#d9340d"
-                if share >= 0.005:
-                    alpha = 0.25 + 0.75 * share
-                    cell.bar(column, 0.92, 0.92, row - 0.46, color=color, alpha=alpha)
-                    text = f"{100 * share:.0f}"
-                    cell.text(column, row, text, ha="center", va="center", size=6)
-            cell.set_title(title)
-            cell.set(xlim=(-0.6, len(labels) - 0.4), ylim=(len(labels) - 0.4, -0.6))
-            cell.set_xticks(range(len(labels)), labels, rotation=90, size=7)
-            names = labels if place == 0 else []
-            cell.set_yticks(range(len(labels)), names or [""] * len(labels), size=7)
-            cell.set_xlabel("taken for, %", size=8)
-            cell.set_aspect("equal")
-        alt = (
-            f"Confusion matrices of the {kind} classifier over {len(labels)} gaits: "
-            "what each gait, a row, was taken for."
-        )
-        return to_svg(figure, alt)
+    return figure, alt

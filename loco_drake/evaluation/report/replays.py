@@ -11,14 +11,10 @@ from typing import Any
 
 from pydrake.geometry import Meshcat, MeshcatAnimation
 
-from loco_drake.common.errors import InputError
-from loco_drake.control.actor import load_actor
 from loco_drake.evaluation.replay import FRAMES_PER_SECOND, dress, frame
 from loco_drake.evaluation.rollout import Recorder
 from loco_drake.evaluation.tracking import tracking_metrics
 from loco_drake.models.plant import PlantConfig
-from loco_drake.models.robots import ROBOTS, get_robot
-from loco_drake.models.shipped import policy_path
 from loco_drake.systems.scenario import GeneratedReference, Scenario, TrainedPolicy
 
 _AGAIN = 10_000  # times that a replay is repeated
@@ -42,18 +38,6 @@ class Replay:
     html: str
     fell: bool
     figures: dict[str, float]
-
-
-def trained_labels() -> dict[str, list[str]]:
-    """Returns the gaits that the shipped policy of each robot was trained on."""
-    labels = {}
-    for name in ROBOTS:
-        robot = get_robot(name)
-        try:
-            labels[name] = load_actor(policy_path(robot), robot).config.labels
-        except InputError:
-            continue  # no policy for this robot yet
-    return labels
 
 
 def record_replays(

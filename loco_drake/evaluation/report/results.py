@@ -1,7 +1,10 @@
-"""Results on disk: what the ``evaluate`` commands wrote, by robot."""
+"""Results on disk: what the ``evaluate`` commands wrote, by robot.
+
+Whatever is read of them is checked. A file that holds anything else than it should is
+damaged, which one sentence says.
+"""
 
 import json
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,19 +14,79 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError
-from loco_drake.evaluation.report.expected import EXPECTED, ResultFile
+from loco_drake.evaluation.report.content import CONTENT
 from loco_drake.models.robots import ROBOTS
 from loco_drake.models.shipped import pretrained_dir
 
+_GREATEST = 1e12  # no figure is beyond that
 
-def results_dir() -> Path:
-    """Returns the folder of the results that come with the package."""
-    return pretrained_dir() / "results"
+
+@dataclass(frozen=True)
+class ResultFile:
+    """A file of results.
+
+    Attributes:
+        name: without robot and suffix.
+        robots: whose figures it is to hold; its own, or all of them.
+        command: writes it, but for ``--json``.
+        flags: the part of ``command`` that figures of tracking do not tell.
+        holds: a key that all figures of a robot have; null where there are none.
+    """
+
+    name: str
+    robots: tuple[str, ...]
+    command: str
+    flags: str = ""
+    holds: str = "labels"
+
+    @property
+    def path(self) -> str:
+        """Its name in the folder of results."""
+        if len(self.robots) > 1:
+            return f"{self.name}.json"
+        kind, _, condition = self.name.partition("-")
+        return "-".join(filter(None, (kind, *self.robots, condition))) + ".json"
+
+
+def tracking_name(condition: str, policy: str = "") -> str:
+    """Returns the name of the results of a shipped policy under a condition."""
+    of_policy = f"{policy}_policy" if policy else ""
+    return "-".join(filter(None, ("tracking", of_policy, condition)))
+
+
+def _expected() -> Iterator[ResultFile]:
+    start = "loco-drake"
+    for result in CONTENT.results:
+        if "{robot}" not in result.command:
+            command = f"{start} {result.command}"
+            yield ResultFile(result.name, ROBOTS, command, holds=result.holds)
+    for policy in CONTENT.policies:
+        asked = f"--policy {policy.name}" if policy.name else ""
+        for robot in policy.robots:
+            for name in CONTENT.worlds if policy.name else CONTENT.conditions:
+                options = CONTENT.conditions[name].options
+                flags = [o for o in options.split() if o in ("--randomize", "--pushes")]
+                line = ("evaluate tracking --robot", robot, asked, options)
+                yield ResultFile(
+                    tracking_name(name, policy.name),
+                    (robot,),
+                    " ".join(filter(None, (start, *line))),
+                    " ".join(filter(None, (asked, *flags))),
+                )
+    for result in CONTENT.results:
+        for robot in ROBOTS if "{robot}" in result.command else ():
+            command = f"{start} {result.command.format(robot=robot)}"
+            yield ResultFile(result.name, (robot,), command, holds=result.holds)
+
+
+EXPECTED = tuple(_expected())
 
 
 @dataclass(frozen=True)
 class Figures:
-    """Figures of one robot, or a part of them; whatever is read is checked.
+    """Figures of one robot, or a part of them.
+
+    Every method raises InputError where the file holds something else.
 
     Attributes:
         values: of a JSON object.
@@ -34,11 +97,7 @@ class Figures:
     origin: Path
 
     def part(self, *keys: str) -> "Figures":
-        """Returns the object that ``keys`` lead to.
-
-        Raises:
-            InputError: if there is none.
-        """
+        """Returns the object that ``keys`` lead to."""
         value: Any = self.values
         for key in keys:
             value = value.get(key) if isinstance(value, dict) else None
@@ -53,26 +112,18 @@ class Figures:
             yield name, within.part(name)
 
     def number(self, key: str) -> float | None:
-        """Returns a figure; None if it is null, or an older result without it.
-
-        Raises:
-            InputError: if it is anything but a finite number.
-        """
+        """Returns a figure; None if it is null, or an older result without it."""
         value = self.values.get(key)
         if value is None:
             return None
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.damaged(f"{key} is {value!r}, not a number")
-        if not math.isfinite(value):
+        if not -_GREATEST <= value <= _GREATEST:  # NaN is not, either
             raise self.damaged(f"{key} is {value}")
         return float(value)
 
     def required(self, key: str) -> float | None:
-        """Returns a figure that every result has, though it may be null.
-
-        Raises:
-            InputError: if it is not there, or not a finite number.
-        """
+        """Returns a figure that every result has, though it may be null."""
         if key not in self.values:
             raise self.damaged(f"it has no {key}")
         return self.number(key)
@@ -86,33 +137,35 @@ class Figures:
         named = Figures({str(i): v for i, v in enumerate(values)}, self.origin)
         return [named.number(str(i)) for i in range(len(values))]
 
-    def strings(self, key: str) -> list[str]:
-        """Returns the list of strings that is called ``key``."""
-        values = self.values.get(key)
-        if not isinstance(values, list) or not all(isinstance(v, str) for v in values):
-            raise self.damaged(f"{key} is no list of strings")
-        return values
+    def text(self, key: str) -> str:
+        """Returns a string, empty where there is none."""
+        value = self.values.get(key)
+        if not isinstance(value, str | None):
+            raise self.damaged(f"{key} is {value!r}, not a string")
+        return value or ""
 
     def matrix(self, key: str, size: int) -> NDArray[np.float64]:
         """Returns the square matrix that is called ``key``, shape (size, size)."""
         try:
             values = np.array(self.values.get(key), float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             values = np.empty(0)
-        if values.shape != (size, size) or not np.isfinite(values).all():
-            raise self.damaged(f"{key} is no matrix of {size} rows and columns")
+        if values.shape != (size, size) or not (np.abs(values) <= 1).all():
+            raise self.damaged(f"{key} is no matrix of {size} rows of shares")
         return values
 
-    def reason(self, key: str) -> str | None:
-        """Returns why ``key`` is null, if that is said."""
+    def reason(self, key: str) -> str:
+        """Returns why ``key`` is null, as far as that is said."""
         reason = self.values.get("reason")
         if isinstance(reason, dict):
             reason = reason.get(key)
-        return str(reason) if reason else None
+        return str(reason or "")
 
     def damaged(self, why: str) -> InputError:
         """Returns the error that says what is wrong with the file."""
-        return InputError(f"{self.origin} is damaged: {why}; write it again.")
+        # What is quoted comes from the file: it may be long, or control a terminal.
+        shown = "".join(filter(str.isprintable, why[:200])) + "..." * (len(why) > 200)
+        return InputError(f"{self.origin} is damaged: {shown}; write it again.")
 
 
 @dataclass(frozen=True)
@@ -138,12 +191,20 @@ class Results:
             name: of the file, without robot and suffix, such as "tracking-generated".
             robot: its name.
         """
-        files = [file for file in EXPECTED if file.name == name]
-        for file in files:
-            figures = self.found.get(file.path, {}).get(robot)
-            if figures is not None:
-                return figures
-        return None
+        files = [
+            self.found.get(file.path, {}) for file in EXPECTED if file.name == name
+        ]
+        return next((found[robot] for found in files if robot in found), None)
+
+    def of_robots(self, name: str) -> dict[str, Figures]:
+        """Returns the figures of each robot that ``name`` has some of."""
+        found = {robot: self.of(name, robot) for robot in ROBOTS}
+        return {robot: own for robot, own in found.items() if own is not None}
+
+
+def results_dir() -> Path:
+    """Returns the folder of the results that come with the package."""
+    return pretrained_dir() / "results"
 
 
 def load_results(folder: Path) -> Results:
@@ -152,10 +213,10 @@ def load_results(folder: Path) -> Results:
     Raises:
         InputError: if the folder is not there or has no results, or one is damaged.
     """
+    names = ", ".join(file.path for file in EXPECTED)
     if not folder.is_dir():
         raise InputError(
-            f"There is no folder of results {str(folder)!r}; it is to hold "
-            f"{', '.join(file.path for file in EXPECTED)}."
+            f"There is no folder of results {str(folder)!r}; it is to hold {names}."
         )
     found, missing = {}, []
     absent: dict[tuple[str, str], str] = {}
@@ -164,38 +225,73 @@ def load_results(folder: Path) -> Results:
         if not path.is_file():
             missing.append(file)
             continue
-        found[file.path] = _by_robot(path, file)
+        found[file.path] = by_robot = _by_robot(path, file)
         for robot in file.robots:
-            figures = found[file.path].get(robot)
-            reason = figures.values.get("reason") if figures is not None else None
-            if figures is None:
+            if robot not in by_robot:
                 absent[file.path, robot] = "the file has no figures of this robot"
-            elif figures.values.get(file.holds) is None:
+            elif by_robot[robot].values.get(file.holds) is None:
+                reason = by_robot.pop(robot).values.get("reason")
                 absent[file.path, robot] = str(reason or "no reason is given")
-                del found[file.path][robot]
     if not found:
         raise InputError(
             f"There are no results in {str(folder)!r}; it is to hold one or more of "
-            f"{', '.join(file.path for file in EXPECTED)}."
+            f"{names}."
         )
     return Results(folder, found, missing, absent)
 
 
-def _by_robot(path: Path, file: ResultFile) -> dict[str, Figures]:
+def read_json(path: Path) -> dict[str, Any]:
+    """Returns the JSON object in a file."""
     try:
-        content = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path} is damaged: it is no JSON ({error}).") from None
     if not isinstance(content, dict):
         raise InputError(f"{path} is damaged: it holds no JSON object.")
-    whole = Figures(content, path)
-    if "robots" in content:
+    return content
+
+
+def _by_robot(path: Path, file: ResultFile) -> dict[str, Figures]:
+    whole = Figures(read_json(path), path)
+    if "robots" in whole.values:
         robots = dict(whole.parts("robots"))
-    elif content.get("robot") in ROBOTS:
-        robots = {content["robot"]: whole}
+    elif whole.text("robot") in ROBOTS:
+        robots = {whole.text("robot"): whole}
     else:
-        raise InputError(
-            f"{path} is damaged: it says of no robot; the choices are "
-            f"{', '.join(ROBOTS)}."
-        )
+        raise whole.damaged(f"it says of no robot; the choices are {', '.join(ROBOTS)}")
     return {name: robots[name] for name in file.robots if name in robots}
+
+
+# Conditions in results of tracking: key, option, and what needs no option.
+_OPTIONS = (
+    ("reference", "--reference", "generated"),
+    ("contact", "--contact", "similar"),
+    ("time_step_s", "--time-step", 0.01),
+    ("friction", "--friction", 0.8),
+    ("duration_s", "--duration", 10.0),
+)
+
+
+def commands(results: Results) -> dict[str, str]:
+    """Returns the command that makes each expected file, by path.
+
+    Of results of tracking that are there, the options are those of their conditions.
+    """
+    return {file.path: _command(file, results) for file in EXPECTED}
+
+
+def _command(file: ResultFile, results: Results) -> str:
+    found = results.found.get(file.path, {})
+    if not file.name.startswith("tracking-") or not found:
+        return file.command
+    (figures,) = found.values()
+    options = [f"--robot {file.robots[0]}"]
+    for key, option, default in _OPTIONS:
+        text = isinstance(default, str)
+        value = figures.text(key) if text else figures.number(key)
+        if value not in (None, "", default):
+            options.append(f"{option} {value if text else f'{value:g}'}")
+    counts = [part.number("episodes") or 0.0 for _, part in figures.parts("labels")]
+    seeds = max(counts, default=0.0)
+    options += filter(None, (file.flags, f"--seeds {seeds:.0f}" if seeds else ""))
+    return f"loco-drake evaluate tracking {' '.join(options)}"

@@ -3,11 +3,19 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from loco_drake.evaluation.report.content import CONTENT, Column
+from loco_drake.evaluation.report.goals import Measured, read_estimate
 from loco_drake.evaluation.report.results import Figures
 from loco_drake.motion.gaits import LABELS
 
 NOTHING = "–"
 NOT_MEASURED = "not measured"  # of what others released
+_TITLES = {"go2": "Go2", "a1": "A1"}
+
+
+def robot_title(name: str) -> str:
+    """Returns the name of a robot as its maker writes it."""
+    return _TITLES.get(name, name)
 
 
 @dataclass(frozen=True)
@@ -65,37 +73,6 @@ class Table:
         return [f"{', '.join(titles)}: {reason}" for reason, titles in rows.items()]
 
 
-@dataclass(frozen=True)
-class Column:
-    """What a column shows.
-
-    Attributes:
-        title: with the unit.
-        key: of the figure.
-        factor: from the figure's unit to the one shown.
-        digits: after the point.
-        within: keys of the object that the figure is in.
-    """
-
-    title: str
-    key: str
-    factor: float = 1.0
-    digits: int = 3
-    within: tuple[str, ...] = ()
-
-    def cell(self, figures: Figures) -> Cell:
-        """Returns the entry that ``figures`` make."""
-        part = figures
-        for key in self.within:
-            if part.values.get(key) is None:
-                return Cell(NOTHING, reason=figures.reason(self.key) or "")
-            part = part.part(key)
-        value = part.number(self.key)
-        if value is None:
-            return Cell(NOTHING, reason=part.reason(self.key) or "")
-        return Cell(number(self.factor * value, self.digits))
-
-
 def number(value: float, digits: int) -> str:
     """Returns a number as text; of what is too small to show, a bound."""
     text = f"{value:.{digits}f}"
@@ -103,9 +80,38 @@ def number(value: float, digits: int) -> str:
         return f"< {10.0**-digits:.{digits}f}"
     if value == 0:
         return "0"
-    if abs(value) >= 1e4:
-        return f"{value:,.{digits}f}"
-    return text
+    return f"{value:,.{digits}f}" if abs(value) >= 1e4 else text
+
+
+def figure_cell(found: Measured | None, digits: int = 3, reason: str = "") -> Cell:
+    """Returns a figure, with its 95 % interval and its price below it."""
+    if found is None:
+        return Cell(NOTHING, reason=reason)
+    notes = list(found.notes)
+    if found.low is not None and found.high is not None:
+        notes.insert(0, f"{number(found.low, digits)}–{number(found.high, digits)}")
+    return Cell(number(found.value, digits), note="; ".join(notes))
+
+
+def column_cell(column: Column, figures: Figures) -> Cell:
+    """Returns the entry that figures make in a column."""
+    *path, last = column.key.split(".")
+    part = figures
+    for key in path:
+        if part.values.get(key) is None:
+            return Cell(NOTHING, reason=figures.reason(last))
+        part = part.part(key)
+    value = part.number(last)
+    if value is None:
+        return Cell(NOTHING, reason=part.reason(last))
+    return Cell(number(column.factor * value, column.digits))
+
+
+def estimate_cell(figures: Figures, *keys: str) -> Cell:
+    """Returns the estimate that ``keys`` lead to."""
+    if figures.values.get(keys[0]) is None:
+        return Cell(NOTHING, reason=figures.reason(keys[0]))
+    return figure_cell(read_estimate(figures, *keys))
 
 
 def label_table(
@@ -119,44 +125,84 @@ def label_table(
         figures: with "labels" and "all".
         note: below the table.
     """
-    by_label = dict(figures.parts("labels"))
-    known = [str(label) for label in LABELS if str(label) in by_label]
-    rows = [
-        Row(label, tuple(column.cell(by_label[label]) for column in columns))
-        for label in known
-    ]
-    whole = figures.part("all")
-    rows.append(Row("all", tuple(column.cell(whole) for column in columns), total=True))
-    return Table(title, "gait", tuple(c.title for c in columns), tuple(rows), note)
-
-
-def row_table(
-    title: str,
-    first: str,
-    columns: Sequence[Column],
-    rows: Iterable[tuple[str, Figures]],
-    note: str = "",
-    extra: Sequence[tuple[str, Callable[[Figures], Cell]]] = (),
-) -> Table:
-    """Returns figures in rows of any kind, such as robots or contact solvers.
-
-    Args:
-        title: over the table.
-        first: title of the first column.
-        columns: to show.
-        rows: title and figures of each.
-        note: below the table.
-        extra: further columns: title, and what makes the entry of a row's figures.
-    """
-    made = tuple(
-        Row(
-            name,
-            (
-                *(column.cell(figures) for column in columns),
-                *(make(figures) for _, make in extra),
-            ),
-        )
-        for name, figures in rows
+    found = dict(figures.parts("labels"))
+    known = {str(label): found[str(label)] for label in LABELS if str(label) in found}
+    rows = tuple(
+        Row(name, tuple(column_cell(c, part) for c in columns), total=name == "all")
+        for name, part in {**known, "all": figures.part("all")}.items()
     )
-    titles = (*(c.title for c in columns), *(title for title, _ in extra))
-    return Table(title, first, titles, made, note)
+    return Table(title, "gait", tuple(c.title for c in columns), rows, note)
+
+
+def transformer_table(generation: dict[str, Figures]) -> Table:
+    """Returns Table 1 of the paper, a row for each source; figures by robot."""
+
+    def theirs(source: str, comparison: str) -> Cell:
+        entry = CONTENT.published(source, comparison)
+        return figure_cell(Measured(entry.mean, entry.low, entry.high))
+
+    title = "Transformer, share of trajectories recognized"
+    return _table_1(title, "transformer", generation, "paper", theirs)
+
+
+def linear_table(generation: dict[str, Figures]) -> Table:
+    """Returns the same by a linear classifier, with the paper's clips beside ours."""
+
+    def theirs(source: str, comparison: str) -> Cell:
+        known = source == "all"
+        return Cell(f"{CONTENT.linear[comparison]:.3f}" if known else NOT_MEASURED)
+
+    title = "Linear classifier on summaries, share of trajectories recognized"
+    return _table_1(title, "linear", generation, "paper's clips", theirs)
+
+
+def matched_table(generation: dict[str, Figures]) -> Table:
+    """Returns the diversity that is left when there are no more samples than real."""
+
+    def cell(figures: Figures, kind: str) -> Cell:
+        matched = "generated_to_real_matched"
+        known = matched in figures.part("classifiers", kind).values
+        return _recognized(figures, kind, matched, "all") if known else Cell(NOTHING)
+
+    return Table(
+        "Diversity, from as many generated trajectories as there are recorded ones",
+        "classifier",
+        tuple(map(robot_title, generation)),
+        tuple(
+            Row(kind, tuple(cell(figures, kind) for figures in generation.values()))
+            for kind in ("transformer", "linear")
+        ),
+    )
+
+
+def _table_1(
+    title: str,
+    kind: str,
+    generation: dict[str, Figures],
+    whose: str,
+    theirs: Callable[[str, str], Cell],
+) -> Table:
+    def cells(source: str) -> Iterable[Cell]:
+        for comparison in CONTENT.comparisons:
+            yield theirs(source, comparison)
+            for figures in generation.values():
+                yield _recognized(figures, kind, comparison, source)
+
+    return Table(
+        title,
+        "source",
+        (whose, *map(robot_title, generation)) * len(CONTENT.comparisons),
+        tuple(
+            Row(name, tuple(cells(source)), total=source == "all")
+            for source, name in CONTENT.sources.items()
+        ),
+        groups=tuple(CONTENT.comparisons.values()),
+    )
+
+
+def _recognized(figures: Figures, kind: str, comparison: str, source: str) -> Cell:
+    part = figures.part("classifiers", kind, comparison)
+    if part.values.get(source) is None:
+        reason = figures.reason("classifiers") or "there is no motion of this source"
+        return Cell(NOTHING, reason=reason)
+    return figure_cell(read_estimate(part, source))

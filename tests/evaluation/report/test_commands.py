@@ -1,9 +1,14 @@
-"""The page's commands have the options that a result was made with."""
+"""The page's commands exist, and have the options that a result was made with."""
 
 import json
+import shlex
+from importlib import import_module
 
-from loco_drake.evaluation.report.commands import commands
-from loco_drake.evaluation.report.results import load_results
+import pytest
+import tyro
+
+from loco_drake.cli.main import _COMMANDS
+from loco_drake.evaluation.report.results import EXPECTED, commands, load_results
 from tests.report_results import tokenizer, tracking, write_results
 
 
@@ -46,3 +51,21 @@ def test_other_policies_and_worlds_are_in_the_command(tmp_path):
         "loco-drake evaluate tracking --robot a1 "
         "--policy unprivileged --randomize --seeds 3"
     )
+
+
+@pytest.mark.parametrize("file", EXPECTED, ids=lambda file: file.path)
+def test_commands_are_of_this_command_line(file):
+    program, first, second, *options = shlex.split(file.command)
+    assert program == "loco-drake"
+    module, class_name, _ = _COMMANDS[f"{first} {second}"]
+    command = getattr(import_module(f"loco_drake.cli.{module}"), class_name)
+    made = tyro.cli(command, args=[*options, "--json", file.path])
+    assert str(made.json) == file.path
+    assert made.robot in ("all", *file.robots)
+
+
+def test_paths_are_distinct_and_name_their_robot():
+    assert len({file.path for file in EXPECTED}) == len(EXPECTED)
+    for file in EXPECTED:
+        if len(file.robots) == 1:
+            assert f"-{file.robots[0]}" in file.path

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from loco_drake.common.errors import InputError
-from loco_drake.evaluation.report.page import drawings, tables
+from loco_drake.evaluation.report import pictures
+from loco_drake.evaluation.report.page import of_results
 from loco_drake.evaluation.report.results import load_results, results_dir
-from loco_drake.evaluation.report.scoreboard import scoreboard
+from tests.report_results import learning, tokenizer, tracking
 
 SHIPPED = sorted(path.name for path in results_dir().glob("*.json"))
-WRONG = ("a word", [], {}, 3, None, True, float("nan"), [[1.0]])
+WRONG = ("a word", [], {}, 3, None, True, float("nan"), 1e300, 10**400, [[1.0]], "$x_{")
 
 
 def places(content):
@@ -27,39 +28,51 @@ def places(content):
         yield from places(content[key])
 
 
-def check(folder, name, content, make):
-    """Makes ``make`` of the content; returns whether that was refused."""
-    (folder / name).write_text(json.dumps(content))
+def said_of(folder, name, written):
+    """Reads a folder with one file; returns what is said of it, nothing if all is well."""
+    (folder / name).write_bytes(written)
     said = None
     try:
-        results = load_results(folder)
-        scoreboard(results)
-        make(results)
+        of_results(load_results(folder))
     except InputError as error:
         said = str(error)
     assert said is None or (name in said and "\n" not in said)
-    return said is not None
+    return said
+
+
+def refused(folder, name, content):
+    return said_of(folder, name, json.dumps(content).encode()) is not None
+
+
+@pytest.fixture(autouse=True)
+def quick_pictures(monkeypatch):
+    """Pictures are drawn but not written, which takes most of the time."""
+    monkeypatch.setattr(
+        "matplotlib.figure.Figure.savefig", lambda self, out, **_: out.write("<svg ")
+    )
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_any_value_that_is_wrong(name, tmp_path):
-    """Each of 40 values is replaced by all wrong ones, or is missing."""
+def test_any_value_that_is_wrong(name, tmp_path, monkeypatch):
+    """Of what tables and goals are made of: each of 12 values, by each wrong one."""
+    for picture in ("confusion", "returns", "learning"):
+        monkeypatch.setattr(pictures, f"{picture}_picture", lambda *_: "")
     content = json.loads((results_dir() / name).read_text())
     random = np.random.default_rng(0)
     found = list(places(content))
-    refused = 0
-    for index in random.choice(len(found), 40, replace=False):
+    count = 0
+    for index in random.choice(len(found), 12, replace=False):
         parent, key = found[index]
         kept = parent[key]
         for wrong in WRONG:
             parent[key] = wrong
-            refused += check(tmp_path, name, content, tables)
+            count += refused(tmp_path, name, content)
         parent[key] = kept
     for key in list(content):
         without = {k: v for k, v in content.items() if k != key}
-        refused += check(tmp_path, name, without, tables)
-    assert refused > 0
-    assert not check(tmp_path, name, content, tables)
+        count += refused(tmp_path, name, without)
+    assert count > 0
+    assert not refused(tmp_path, name, content)
 
 
 @pytest.mark.parametrize(
@@ -69,6 +82,7 @@ def test_any_value_that_is_wrong(name, tmp_path):
         ("learning-go2.json", ("learning", "steps")),
         ("learning-go2.json", ("learning", "return")),
         ("tracking-go2-generated.json", ("labels", "dog-trot")),
+        ("tracking-go2-generated.json", ("contact",)),
         ("generation.json", ("robots", "go2", "confusion", "labels")),
         ("generation.json", ("robots", "go2", "confusion", "transformer")),
         (
@@ -77,11 +91,50 @@ def test_any_value_that_is_wrong(name, tmp_path):
         ),
     ],
 )
-@pytest.mark.parametrize("wrong", ["a word", [1.0, "x"], {"a": []}])
-def test_what_pictures_are_made_of(name, path, wrong, tmp_path):
+@pytest.mark.parametrize("wrong", [3, [1.0, "x"], {"a": []}])
+def test_values_of_another_kind_are_refused(name, path, wrong, tmp_path):
     content = json.loads((results_dir() / name).read_text())
     parent = content
     for key in path[:-1]:
         parent = parent[key]
     parent[path[-1]] = wrong
-    assert check(tmp_path, name, content, drawings)
+    assert refused(tmp_path, name, content)
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        b"",
+        b"\0" * 100,
+        b"\xff\xfe\x00{",
+        b'{"robot": "go2", "labels": \xe9}',
+        b"[" * 100_000,
+        b'{"robots": ' * 100_000,
+        b'{"robot": ' + b"9" * 5000 + b"}",
+    ],
+    ids=["empty", "zeros", "utf-16", "latin-1", "nested", "nested objects", "digits"],
+)
+def test_bytes_that_are_no_results_are_refused(written, tmp_path):
+    assert said_of(tmp_path, "tokenizer.json", written)
+
+
+def test_long_names_and_line_breaks_do_not_reach_the_message(tmp_path):
+    name = "tokenizer.json"
+    for wrong in ("x" * 10_000, "one\ntwo\r\x1b[31m"):
+        content = {"robot": "go2", **tokenizer(joint_rmse_rad=wrong)}
+        said = said_of(tmp_path, name, json.dumps(content).encode())
+        assert len(said) < 400
+        assert said.isprintable()
+    (tmp_path / name).unlink()
+    content = learning()
+    content["learning"]["return"]["y\n" * 10_000] = []
+    said = said_of(tmp_path, "learning-go2.json", json.dumps(content).encode())
+    assert len(said) < 400
+    assert said.isprintable()
+
+
+def test_labels_of_results_need_not_be_those_of_the_package(tmp_path):
+    """A label that is not one of the fifteen is left out of the tables, not refused."""
+    content = tracking()
+    content["labels"]["cat-sneak"] = content["labels"]["dog-trot"]
+    assert not refused(tmp_path, "tracking-go2-generated.json", content)

@@ -4,10 +4,17 @@ import math
 
 import pytest
 
-from loco_drake.evaluation.report.goal import BEST, MET, MISSED, UNKNOWN
-from loco_drake.evaluation.report.goals import GOALS
+from loco_drake.evaluation.report.content import CONTENT
+from loco_drake.evaluation.report.goals import (
+    BEST,
+    MET,
+    MISSED,
+    UNKNOWN,
+    counts,
+    scoreboard,
+)
 from loco_drake.evaluation.report.results import load_results
-from loco_drake.evaluation.report.scoreboard import counts, scoreboard
+from loco_drake.evaluation.report.tables import figure_cell
 from tests.report_results import (
     learning,
     retargeting,
@@ -16,14 +23,17 @@ from tests.report_results import (
     write_results,
 )
 
+GOALS = sum(map(len, CONTENT.goals.values()))
+
 
 def score(folder, title, robot="go2"):
     """Text, note and verdict of the first goal whose title begins so."""
     parts = scoreboard(load_results(folder)).values()
     lines = [line for part in parts for line in part]
     line = next(line for line in lines if line.goal.title.startswith(title))
-    found = line.scores[("go2", "a1").index(robot)]
-    return found.cell.text, found.cell.note, found.verdict
+    place = ("go2", "a1").index(robot)
+    cell = figure_cell(line.measured[place], line.goal.digits)
+    return cell.text, cell.note, line.verdicts[place]
 
 
 @pytest.mark.parametrize(
@@ -87,5 +97,5 @@ def test_what_was_not_measured_is_neither_met_nor_missed(tmp_path):
     assert score(tmp_path, "toe error")[::2] == ("16.3", MISSED)
     assert score(tmp_path, "joint error, rec", "a1")[::2] == ("–", UNKNOWN)
     counted = counts(scoreboard(load_results(tmp_path)))
-    assert counted["go2"] == {"met": 2, "measured": 3, "goals": len(GOALS)}
-    assert counted["a1"] == {"met": 1, "measured": 2, "goals": len(GOALS)}
+    assert counted["go2"] == {"met": 2, "measured": 3, "goals": GOALS}
+    assert counted["a1"] == {"met": 1, "measured": 2, "goals": GOALS}

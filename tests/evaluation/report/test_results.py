@@ -3,9 +3,8 @@
 import pytest
 
 from loco_drake.common.errors import InputError
-from loco_drake.evaluation.report.expected import EXPECTED
-from loco_drake.evaluation.report.results import load_results
-from loco_drake.evaluation.report.scoreboard import scoreboard
+from loco_drake.evaluation.report.goals import scoreboard
+from loco_drake.evaluation.report.results import EXPECTED, load_results
 from tests.report_results import (
     learning,
     retargeting,

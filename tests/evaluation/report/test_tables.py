@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from loco_drake.evaluation.report.content import Column
 from loco_drake.evaluation.report.results import Figures
-from loco_drake.evaluation.report.tables import Column, label_table, number
+from loco_drake.evaluation.report.tables import label_table, number
 
 
 @pytest.mark.parametrize(
