@@ -29,7 +29,7 @@ def places(content):
 
 
 def said_of(folder, name, written):
-    """Reads a folder with one file; returns what is said of it, nothing if all is well."""
+    """Reads a folder with one file; returns what is said of it, if it is refused."""
     (folder / name).write_bytes(written)
     said = None
     try:
