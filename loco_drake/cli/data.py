@@ -3,15 +3,15 @@
 from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tyro
 
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.files import atomic_path
-from loco_drake.datasets.registry import DATASETS, data_dir, read_clip
-from loco_drake.datasets.segments import read_segments
-from loco_drake.retargeting.inspection import ClipSummary, clip_figure, summarize
+
+if TYPE_CHECKING:
+    from loco_drake.retargeting.inspection import ClipSummary
 
 
 @dataclass(kw_only=True)
@@ -31,6 +31,9 @@ class DataList:
         Raises:
             InputError: if there is no data folder, or its segments.csv is damaged.
         """
+        from loco_drake.datasets.registry import DATASETS, data_dir
+        from loco_drake.datasets.segments import read_segments
+
         segments = read_segments(data_dir(self.data_dir))
         figures: dict[str, dict[str, Any]] = {}
         for source, dataset in DATASETS.items():
@@ -89,6 +92,9 @@ class DataInspect:
         Raises:
             InputError: if the file is not of the source's format.
         """
+        from loco_drake.datasets.registry import read_clip
+        from loco_drake.retargeting.inspection import clip_figure, summarize
+
         clip = read_clip(
             self.source,
             self.file,
@@ -109,7 +115,7 @@ class DataInspect:
         return 0
 
 
-def _rows(summary: ClipSummary) -> list[list[str]]:
+def _rows(summary: "ClipSummary") -> list[list[str]]:
     def text(value: float | None) -> str:
         return "-" if value is None else f"{value:.3g}"
 

@@ -20,7 +20,7 @@ from loco_drake.cli.output import (
     write_json,
 )
 from loco_drake.cli.trained_on import trained_on
-from loco_drake.common.errors import InputError, check_at_least
+from loco_drake.common.errors import InputError, check_at_least, check_choice
 from loco_drake.datasets.registry import data_dir
 from loco_drake.evaluation.generation import Generated, GenerationScore
 from loco_drake.evaluation.generation_pictures import confusion_figure, motion_figure
@@ -28,7 +28,7 @@ from loco_drake.evaluation.model_figures import Effort, score_model, score_motio
 from loco_drake.evaluation.recorded import Recorded, retarget_recordings
 from loco_drake.evaluation.train_classifier import STEPS
 from loco_drake.generation.motion_model import MotionModel, load_motion_model
-from loco_drake.models.robots import Robot, get_robot
+from loco_drake.models.robots import ROBOTS, Robot, get_robot
 from loco_drake.models.shipped import pretrained_path
 from loco_drake.motion.gaits import LABELS, SOURCES, parse_label
 from loco_drake.motion.motion import FPS, Motion, load_motion
@@ -81,6 +81,7 @@ class EvaluateGeneration:
         Raises:
             InputError: if an option is wrong, or there is nothing to compare.
         """
+        check_choice("robot", self.robot, (*ROBOTS, "all"))
         for name, least in (
             ("count", 1),
             ("generator_seeds", 1),

@@ -53,6 +53,7 @@ class EvaluateRetargeting:
         if not is_robot_file(self.robot):
             check_choice("robot", self.robot, (*ROBOTS, "all"))
         check_at_least("seeds", self.seeds, 1)
+        check_at_least("workers", self.workers, 1)
         segments = select_labels(read_segments(data_dir(self.data_dir)), self.labels)
         definitions = ROBOTS if self.robot == "all" else (self.robot,)
         models = {robot.name: robot for robot in map(load_robot, definitions)}

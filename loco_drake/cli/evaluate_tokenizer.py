@@ -11,13 +11,13 @@ from loco_drake.cli.evaluation import (
 )
 from loco_drake.cli.output import print_failed, print_table, write_json
 from loco_drake.cli.trained_on import trained_on
-from loco_drake.common.errors import InputError, check_at_least
+from loco_drake.common.errors import InputError, check_at_least, check_choice
 from loco_drake.datasets.registry import data_dir
 from loco_drake.evaluation.generation_pictures import code_use_figure
 from loco_drake.evaluation.recorded import retarget_recordings
 from loco_drake.evaluation.tokenizer import evaluate_tokenizer
 from loco_drake.generation.tokenizer import Tokenizer, load_tokenizer
-from loco_drake.models.robots import get_robot
+from loco_drake.models.robots import ROBOTS, get_robot
 from loco_drake.models.shipped import pretrained_path
 from loco_drake.motion.gaits import parse_label
 
@@ -58,11 +58,11 @@ class EvaluateTokenizer:
         Raises:
             InputError: if an option is wrong.
         """
+        check_choice("robot", self.robot, (*ROBOTS, "all"))
         check_at_least("seeds", self.seeds, 1)
         check_at_least("workers", self.workers, 1)
         for label in self.labels:
             parse_label(label)
-        folder = data_dir(self.data_dir)
         tokenizer = load_tokenizer(self.tokenizer or pretrained_path("tokenizer"))
         books = tokenizer.config.books
         if self.books is not None and not 1 <= self.books <= books:
@@ -70,6 +70,7 @@ class EvaluateTokenizer:
                 f"--books must be from 1 to {books}, as many as the tokenizer has, "
                 f"not {self.books}."
             )
+        folder = data_dir(self.data_dir)
         result = of_robots(
             self.robot,
             lambda name: self._robot(folder, tokenizer, name),

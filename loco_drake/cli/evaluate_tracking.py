@@ -89,6 +89,7 @@ class EvaluateTracking:
         check_choice("reference", self.reference, ("generated", "retargeted"))
         check_duration(self.duration)
         check_at_least("seeds", self.seeds, 1)
+        check_at_least("workers", self.workers, 1)
         randomization = self._randomization()
         names = list(ROBOTS) if self.robot == "all" else [self.robot]
         plans = {name: self._plan(name) for name in names}

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Any
 
 from loco_drake.common.errors import InputError, check_choice
 from loco_drake.common.files import atomic_path
-from loco_drake.models.robots import ROBOTS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def of_robots(
@@ -27,6 +27,8 @@ def of_robots(
     Raises:
         InputError: from ``evaluate``.
     """
+    from loco_drake.models.robots import ROBOTS
+
     check_choice("robot", robot, (*ROBOTS, "all"))
     if robot != "all":
         return {"robot": robot, **evaluate(robot)}
@@ -58,7 +60,7 @@ def estimate_text(estimate: dict[str, float] | None) -> str:
     return f"{mean:.3f} [{low:.3f}, {high:.3f}]"
 
 
-def write_figure(figure: Figure, path: Path) -> None:
+def write_figure(figure: "Figure", path: Path) -> None:
     """Writes a picture, wholly or not at all."""
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=120)

@@ -8,10 +8,6 @@ import tyro
 
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import InputError
-from loco_drake.control.actor import load_actor
-from loco_drake.models.robots import get_robot
-from loco_drake.models.shipped import policy_path
-from loco_drake.tracking.onnx_policy import export_onnx
 
 
 @dataclass(kw_only=True)
@@ -32,6 +28,11 @@ class Export:
 
     def run(self) -> int:
         """Writes and prints; returns the exit status."""
+        from loco_drake.control.actor import load_actor
+        from loco_drake.models.robots import get_robot
+        from loco_drake.models.shipped import policy_path
+        from loco_drake.tracking.onnx_policy import export_onnx
+
         robot = get_robot(self.robot)
         if self.out.suffix != ".onnx":
             raise InputError(f"--out must end in .onnx, not {str(self.out)!r}.")

@@ -6,15 +6,6 @@ from pathlib import Path
 
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import check_at_least, check_choice
-from loco_drake.generation.generate import (
-    check_duration,
-    check_pace,
-    check_sampling,
-    generate_motions,
-)
-from loco_drake.generation.motion_model import load_motion_model
-from loco_drake.models.robots import ROBOTS
-from loco_drake.models.shipped import pretrained_path
 from loco_drake.motion.gait_schedule import parse_schedule
 from loco_drake.motion.motion import FPS, save_motion
 
@@ -58,6 +49,16 @@ class Generate:
         Raises:
             InputError: if an option is wrong.
         """
+        from loco_drake.generation.generate import (
+            check_duration,
+            check_pace,
+            check_sampling,
+            generate_motions,
+        )
+        from loco_drake.generation.motion_model import load_motion_model
+        from loco_drake.models.robots import ROBOTS
+        from loco_drake.models.shipped import pretrained_path
+
         schedule = parse_schedule(self.gait)
         check_duration(self.duration)
         schedule.check_ends_by(self.duration)

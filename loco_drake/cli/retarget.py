@@ -3,30 +3,20 @@
 from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tyro
 from rich.console import Console
 from rich.progress import Progress
 
 from loco_drake.cli.output import print_failed, print_table, write_json
-from loco_drake.common.errors import InputError
-from loco_drake.datasets.registry import data_dir, read_clip
-from loco_drake.datasets.segments import (
-    Segment,
-    one_format,
-    read_segments,
-    select_segments,
-)
-from loco_drake.datasets.split import TRAIN, VALIDATION, Split
-from loco_drake.models.robot_files import load_robot
+from loco_drake.common.errors import InputError, check_at_least, check_choice
 from loco_drake.motion.gaits import LABELS
-from loco_drake.retargeting.batch import Outcome, retarget_segments, stretches_of
-from loco_drake.retargeting.trajectories import (
-    SECONDS,
-    choose_windows,
-    write_trajectories,
-)
-from loco_drake.retargeting.variants import Variant
+
+if TYPE_CHECKING:
+    from loco_drake.datasets.segments import Segment
+    from loco_drake.datasets.split import Split
+    from loco_drake.retargeting.batch import Outcome
 
 
 @dataclass(kw_only=True)
@@ -83,11 +73,16 @@ class Retarget:
         Raises:
             InputError: if an option is wrong, or FILE cannot be retargeted.
         """
+        from loco_drake.datasets.registry import DATASETS
+        from loco_drake.models.robot_files import load_robot
+        from loco_drake.retargeting.batch import retarget_segments
+        from loco_drake.retargeting.variants import Variant
+
         robot = load_robot(self.robot)
-        if self.trajectories < 0:
-            raise InputError(
-                f"--trajectories must be 0 or more, not {self.trajectories}."
-            )
+        check_at_least("trajectories", self.trajectories, 0)
+        check_at_least("workers", self.workers, 1)
+        if self.source is not None:
+            check_choice("source", self.source, DATASETS)
         segments, split = self._segments()
         variant = Variant(mirror=self.mirror, froude=self.froude)
         out = self.out or Path("motions") / f"{robot.name}{variant.suffix}"
@@ -111,7 +106,15 @@ class Retarget:
         print_failed((o.segment.name, str(o.error)) for o in failed)
         return 1 if failed else 0
 
-    def _cut(self, outcomes: list[Outcome], split: Split, folder: Path) -> None:
+    def _cut(self, outcomes: "list[Outcome]", split: "Split", folder: Path) -> None:
+        from loco_drake.datasets.split import TRAIN, VALIDATION
+        from loco_drake.retargeting.batch import stretches_of
+        from loco_drake.retargeting.trajectories import (
+            SECONDS,
+            choose_windows,
+            write_trajectories,
+        )
+
         windows = choose_windows(
             stretches_of(outcomes, split), self.trajectories, self.seed
         )
@@ -125,8 +128,16 @@ class Retarget:
         title = f"Trajectories of {SECONDS:g} s in {folder}: {len(windows)}"
         print_table(title, ["label", TRAIN, VALIDATION], rows)
 
-    def _segments(self) -> tuple[list[Segment], Split | None]:
+    def _segments(self) -> "tuple[list[Segment], Split | None]":
         """Returns what to retarget, and the split of the data folder it is from."""
+        from loco_drake.datasets.registry import data_dir
+        from loco_drake.datasets.segments import (
+            one_format,
+            read_segments,
+            select_segments,
+        )
+        from loco_drake.datasets.split import Split
+
         if self.file is not None:
             return [self._segment_of_file(self.file)], None
         if (self.start, self.end, self.fps) != (None, None, None):
@@ -139,7 +150,10 @@ class Retarget:
             found = [segment for segment in found if segment.label in known]
         return found, split
 
-    def _segment_of_file(self, file: Path) -> Segment:
+    def _segment_of_file(self, file: Path) -> "Segment":
+        from loco_drake.datasets.registry import read_clip
+        from loco_drake.datasets.segments import Segment
+
         if self.source is None or len(self.gait) != 1:
             raise InputError("A FILE needs its --source and one --gait.")
         (gait,) = self.gait
@@ -155,7 +169,7 @@ class Retarget:
         return Segment(self.source, file, gait, start, end, clip.fps)
 
 
-def _figures(outcome: Outcome) -> dict[str, object]:
+def _figures(outcome: "Outcome") -> dict[str, object]:
     if outcome.report is None:
         return {"error": outcome.error}
     return {**asdict(outcome.report), "path": str(outcome.path)}
@@ -175,7 +189,7 @@ _COLUMNS = {
 }
 
 
-def _row(outcome: Outcome) -> list[str]:
+def _row(outcome: "Outcome") -> list[str]:
     figures = _figures(outcome)
     row = [outcome.segment.name]
     for column, key in list(_COLUMNS.items())[1:]:

@@ -3,30 +3,22 @@
 import sys
 import time
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import tyro
-from pydrake.geometry import Meshcat, MeshcatParams
 
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import atomic_path
-from loco_drake.control.plan import PLAN_DT
-from loco_drake.evaluation.replay import FRAMES_PER_SECOND, dress, frame
-from loco_drake.evaluation.rollout import Recorder
-from loco_drake.evaluation.tracking import tracking_metrics
-from loco_drake.models.plant import PlantConfig
-from loco_drake.models.robots import get_robot
 from loco_drake.motion.gait_schedule import parse_schedule
 from loco_drake.motion.motion import Motion, load_motion
-from loco_drake.systems.scenario import (
-    GeneratedReference,
-    MotionReference,
-    Scenario,
-    TrainedPolicy,
-)
+
+if TYPE_CHECKING:
+    from pydrake.geometry import Meshcat
+
+    from loco_drake.systems.scenario import Scenario
 
 _MAX_DURATION = 3600.0
 
@@ -66,6 +58,11 @@ class Simulate:
 
     def run(self) -> int:
         """Simulates, prints and writes; returns the exit status."""
+        from loco_drake.control.plan import PLAN_DT
+        from loco_drake.evaluation.replay import FRAMES_PER_SECOND, frame
+        from loco_drake.evaluation.rollout import Recorder
+        from loco_drake.evaluation.tracking import tracking_metrics
+
         motion = self._check()
         meshcat = self._start_meshcat()
         scenario = self._scenario(visual=meshcat is not None)
@@ -110,8 +107,11 @@ class Simulate:
 
     def _check(self) -> Motion | None:
         """Returns the Motion file to follow, if any; raises InputError if amiss."""
+        from loco_drake.control.plan import PLAN_DT
+        from loco_drake.models.robots import get_robot
+
         get_robot(self.robot)
-        if not (np.isfinite(self.duration) and 0 < self.duration <= _MAX_DURATION):
+        if not (isfinite(self.duration) and 0 < self.duration <= _MAX_DURATION):
             raise InputError(
                 f"The duration must be above 0 s and at most {_MAX_DURATION:g} s, "
                 f"not {self.duration}."
@@ -133,7 +133,15 @@ class Simulate:
             )
         return motion
 
-    def _scenario(self, *, visual: bool) -> Scenario:
+    def _scenario(self, *, visual: bool) -> "Scenario":
+        from loco_drake.models.plant import PlantConfig
+        from loco_drake.systems.scenario import (
+            GeneratedReference,
+            MotionReference,
+            Scenario,
+            TrainedPolicy,
+        )
+
         reference: GeneratedReference | MotionReference
         if self.reference == "gpt":
             reference = GeneratedReference(
@@ -153,7 +161,9 @@ class Simulate:
             policy=TrainedPolicy(weights=self.policy),
         )
 
-    def _start_meshcat(self) -> Meshcat | None:
+    def _start_meshcat(self) -> "Meshcat | None":
+        from loco_drake.evaluation.replay import dress
+
         if not self.meshcat and self.html is None:
             return None
         meshcat = _open_meshcat(self.port)
@@ -163,8 +173,10 @@ class Simulate:
         return meshcat
 
 
-def _open_meshcat(port: int | None) -> Meshcat:
+def _open_meshcat(port: int | None) -> "Meshcat":
     """Returns a Meshcat at ``port``, or at a free one if that is in use."""
+    from pydrake.geometry import Meshcat, MeshcatParams
+
     if port is None:
         return Meshcat()
     if not (1024 <= port <= 65535):

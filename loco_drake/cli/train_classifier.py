@@ -9,19 +9,7 @@ from loco_drake.cli.evaluation import estimate_text
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.cli.training import check_steps, print_stopped
 from loco_drake.common.errors import InputError
-from loco_drake.evaluation.classifier import ClassifierConfig, predict
-from loco_drake.evaluation.confidence import accuracy
-from loco_drake.evaluation.recorded import load_recorded
-from loco_drake.evaluation.samples import SECONDS, label_weights, make_samples
-from loco_drake.evaluation.train_classifier import (
-    LEARNING_RATE,
-    STEPS,
-    class_indices,
-    train_classifier,
-)
-from loco_drake.generation.training import LoopSettings
 from loco_drake.motion.gaits import LABELS
-from loco_drake.retargeting.trajectories import trajectories
 
 
 @dataclass(kw_only=True)
@@ -37,9 +25,9 @@ class TrainClassifier:
     out to test on."""
     out: Path = Path("runs/classifier")
     """Folder for the weights (classifier.safetensors), checkpoint and logs."""
-    steps: int = STEPS
+    steps: int = 300
     """Optimizer steps."""
-    learning_rate: float = LEARNING_RATE
+    learning_rate: float = 1e-3
     """Highest learning rate."""
     seed: int = 0
     """Of the weights and the batches."""
@@ -55,6 +43,17 @@ class TrainClassifier:
             InputError: if an option is wrong.
         """
         check_steps(self.steps, self.learning_rate)
+        from loco_drake.evaluation.classifier import ClassifierConfig, predict
+        from loco_drake.evaluation.confidence import accuracy
+        from loco_drake.evaluation.recorded import load_recorded
+        from loco_drake.evaluation.samples import SECONDS, label_weights, make_samples
+        from loco_drake.evaluation.train_classifier import (
+            class_indices,
+            train_classifier,
+        )
+        from loco_drake.generation.training import LoopSettings
+        from loco_drake.retargeting.trajectories import trajectories
+
         robot, recorded = load_recorded(self.motions)
         train, validation = (
             [part for motion in side for part in trajectories(motion)]

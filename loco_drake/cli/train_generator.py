@@ -7,15 +7,6 @@ from pathlib import Path
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.cli.training import check_steps, print_stopped
 from loco_drake.common.errors import InputError, check_at_least
-from loco_drake.generation.generator import GeneratorConfig
-from loco_drake.generation.tokenizer import load_tokenizer
-from loco_drake.generation.train_generator import (
-    STITCHED,
-    score_generator,
-    train_generator,
-)
-from loco_drake.generation.training import LoopSettings
-from loco_drake.generation.training_motions import load_library
 
 
 @dataclass(kw_only=True)
@@ -36,7 +27,7 @@ class TrainGenerator:
     what is too irregular to be predicted."""
     steps: int = 6000
     """Optimizer steps."""
-    stitched: int = STITCHED
+    stitched: int = 50
     """Motions of 20 s that are made of the clips to learn from, for each gait."""
     learning_rate: float = 1e-3
     """Highest learning rate."""
@@ -55,6 +46,15 @@ class TrainGenerator:
         """
         check_steps(self.steps, self.learning_rate)
         check_at_least("stitched", self.stitched, 1)
+        from loco_drake.generation.generator import GeneratorConfig
+        from loco_drake.generation.tokenizer import load_tokenizer
+        from loco_drake.generation.train_generator import (
+            score_generator,
+            train_generator,
+        )
+        from loco_drake.generation.training import LoopSettings
+        from loco_drake.generation.training_motions import load_library
+
         library = load_library(*self.motions)
         tokenizer = load_tokenizer(self.tokenizer)
         if not 1 <= self.books <= tokenizer.config.books:

@@ -6,11 +6,6 @@ from pathlib import Path
 
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.cli.training import check_steps, print_stopped
-from loco_drake.generation.tokenizer import TokenizerConfig
-from loco_drake.generation.tokenizer_score import codebook_use, score_tokenizer
-from loco_drake.generation.train_tokenizer import train_tokenizer
-from loco_drake.generation.training import LoopSettings
-from loco_drake.generation.training_motions import load_library
 
 
 @dataclass(kw_only=True)
@@ -43,6 +38,12 @@ class TrainTokenizer:
             InputError: if an option is wrong.
         """
         check_steps(self.steps, self.learning_rate)
+        from loco_drake.generation.tokenizer import TokenizerConfig
+        from loco_drake.generation.tokenizer_score import codebook_use, score_tokenizer
+        from loco_drake.generation.train_tokenizer import train_tokenizer
+        from loco_drake.generation.training import LoopSettings
+        from loco_drake.generation.training_motions import load_library
+
         library = load_library(*self.motions)
         settings = LoopSettings(
             out=self.out,
