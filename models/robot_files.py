@@ -11,37 +11,36 @@ the frame at the centre of its toe's sphere, and the usual stance::
       ...
 """
 
-import xml.etree.ElementTree as ET
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common.yaml import yaml_load_typed
-from pydrake.multibody.parsing import PackageMap, Parser
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import RevoluteJoint
+from pydrake.math import RollPitchYaw, RotationMatrix
 
-from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.errors import InputError
+from loco_drake.common.typed_yaml import read_yaml
 
 from .chains import ChainRobot
 from .legs import LEGS
-from .meshes import vendor_folder
 from .quadruped import Quadruped
 from .robots import ROBOTS, get_robot
+from .urdf import find_urdf, read_legs
 
 Array = NDArray[np.float64]
 
 SUFFIXES = (".yaml", ".yml")
 
-# What is left of a URDF: what moves, and how.
-_KEPT = {
-    "robot": {"link", "joint", "frame"},
-    "joint": {"parent", "child", "origin", "axis", "limit"},
-}
+# Smaller and larger robots are taken for millimetres, or for legs that fold away; m.
+STAND_HEIGHTS = (0.03, 3.0)
+# Of the radius of a foot over the height of the trunk over it.
+_MAX_FOOT = 0.4
+# An axis is where it should be if it is off by less than 45 degrees.
+_ALONG = np.sqrt(0.5)
+_MAX_TURN = 20.0  # rad; more must be degrees
 
 
-# Not frozen: yaml_load_typed sets the fields one by one.
 @dataclass(kw_only=True)
 class LegFile:
     """One leg of a robot."""
@@ -102,16 +101,7 @@ def read_robot(path: Path) -> ChainRobot:
     Raises:
         InputError: naming what is missing, unknown or impossible.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"There is no robot file {str(path)!r}.")
-    try:
-        file = yaml_load_typed(
-            schema=RobotFile, filename=str(path), defaults=RobotFile()
-        )
-    except Exception as error:  # Drake and PyYAML raise many kinds
-        reason = " ".join(str(error).split())
-        raise InputError(f"{path} is not a robot file: {reason}") from None
+    file = read_yaml(path, RobotFile, "a robot file")
     try:
         _check(file)
         return _make(file, path)
@@ -146,48 +136,47 @@ def _check(file: RobotFile) -> None:
                 raise InputError(
                     f"{key} of leg {name} must be {count} numbers, one for each joint."
                 )
+            if key != "speed" and values and np.abs(values).max() > _MAX_TURN:
+                raise InputError(
+                    f"{key} of leg {name} must be in rad, not {values} (in degrees?)."
+                )
         if leg.speed and min(leg.speed) <= 0:
             raise InputError(f"speed of leg {name} must be above 0 rad/s.")
 
 
 def _make(file: RobotFile, path: Path) -> ChainRobot:
     legs = [file.legs[leg] for leg in LEGS]
-    joint_names = tuple(joint for leg in legs for joint in leg.joints)
     name = file.name or path.stem
     if name in ROBOTS:
         raise InputError(f"The name {name!r} is taken; give another as its name.")
-    model = _kinematic_urdf(_find_urdf(file.urdf, path.parent), joint_names)
-    plant = MultibodyPlant(time_step=0.0)
-    try:
-        Parser(plant).AddModelsFromString(model, "urdf")
-    except RuntimeError as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"Drake cannot read {file.urdf}: {reason}") from None
-    # Drake adds frames of its own, which nobody means.
-    tags = ET.fromstring(model)
-    frames = [str(tag.get("name")) for tag in tags if tag.tag in ("link", "frame")]
-    check_choice("trunk", file.trunk, frames)
-    for leg in legs:
-        check_choice("foot", leg.foot, frames)
-    joints = [_revolute(plant, name) for name in joint_names]
-    plant.Finalize()
-    for key, leg in zip(LEGS, legs, strict=True):
-        _check_path(plant, key, leg, joint_names)
-
-    lower = _limits(legs, "lower", [j.position_lower_limits()[0] for j in joints])
-    upper = _limits(legs, "upper", [j.position_upper_limits()[0] for j in joints])
-    speed = _limits(legs, "speed", [j.velocity_upper_limits()[0] for j in joints])
-    stand = np.array([angle for leg in legs for angle in leg.stand])
-    wrong = [
-        f"{joint} at {angle:g} rad is not within {low:g} to {high:g}"
-        for joint, low, angle, high in zip(
-            joint_names, lower, stand, upper, strict=True
+    if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}", name):
+        raise InputError(
+            f"The name {name[:80]!r} must be letters, digits, _, - and ., at most 64; "
+            "give another as its name."
         )
-        if not low <= angle <= high
-    ]
-    if wrong:
-        raise InputError(f"In the stance {wrong[0]}.")
-    axes, origins, toes = _chains(plant, file.trunk, joints, [g.foot for g in legs])
+    stand = np.array([angle for leg in legs for angle in leg.stand])
+    urdf = read_legs(
+        find_urdf(file.urdf, path.parent),
+        file.trunk,
+        [leg.joints for leg in legs],
+        [leg.foot for leg in legs],
+        stand,
+    )
+    lower, upper, speed = (
+        _limits(legs, key, own)
+        for key, own in (
+            ("lower", urdf.lower),
+            ("upper", urdf.upper),
+            ("speed", urdf.speed),
+        )
+    )
+    joint_names = tuple(joint for leg in legs for joint in leg.joints)
+    for joint, low, angle, high in zip(joint_names, lower, stand, upper, strict=True):
+        if not low <= angle <= high:
+            raise InputError(
+                f"In the stance {joint} at {angle:g} rad is not within {low:g} to "
+                f"{high:g}."
+            )
     robot = ChainRobot(
         name=name,
         definition=str(path.resolve()),
@@ -195,110 +184,102 @@ def _make(file: RobotFile, path: Path) -> ChainRobot:
         joint_lower=lower,
         joint_upper=upper,
         joint_speed_limits=speed,
-        p_BHip=origins[:, 0].copy(),
+        p_BHip=urdf.origins[:, 0].copy(),
         foot_radius=file.foot_radius,
         stand_joints=stand,
         stand_height=0.0,
         trunk_frame=file.trunk,
         foot_frames=tuple(leg.foot for leg in legs),
-        model=model,
-        axes=axes,
-        origins=origins,
-        toes=toes,
+        model=urdf.model,
+        axes=urdf.axes,
+        origins=urdf.origins,
+        toes=urdf.toes,
     )
-    lowest = float(robot.toe_positions(stand)[:, 2].min())
-    if lowest >= 0:
-        raise InputError("In the stance the feet are not below the trunk.")
-    return replace(robot, stand_height=file.foot_radius - lowest)
-
-
-def _find_urdf(url: str, folder: Path) -> Path:
-    """Returns the path of a URDF, which exists."""
-    if url.startswith("package://"):
-        packages = PackageMap.MakeEmpty()
-        packages.PopulateFromRosPackagePath()
-        packages.Add("example-robot-data", str(vendor_folder()))
-        package, _, inside = url.removeprefix("package://").partition("/")
-        check_choice("package", package, packages.GetPackageNames())
-        found = Path(packages.GetPath(package)) / inside
-    else:
-        found = folder / url
-    if not found.is_file():
-        raise InputError(f"There is no URDF {str(found)!r}.")
-    return found
-
-
-def _kinematic_urdf(path: Path, joints: tuple[str, ...]) -> str:
-    """Returns a URDF of links and joints alone, in which only ``joints`` move."""
-    try:
-        root = ET.parse(path).getroot()
-    except ET.ParseError as error:
-        raise InputError(f"{path} is not XML: {error}.") from None
-    for element in [root, *root.iterfind("joint"), *root.iterfind("link")]:
-        for child in list(element):
-            if child.tag not in _KEPT.get(element.tag, set()):
-                element.remove(child)
-    for joint in root.iterfind("joint"):
-        if joint.get("name") not in joints:
-            joint.set("type", "fixed")
-    return ET.tostring(root, encoding="unicode")
-
-
-def _revolute(plant: MultibodyPlant, name: str) -> RevoluteJoint:
-    names = [plant.get_joint(i).name() for i in plant.GetJointIndices()]
-    joint = plant.GetJointByName(check_choice("joint", name, names))
-    if not isinstance(joint, RevoluteJoint):
+    toes = robot.toe_positions(stand)
+    _check_trunk(file.trunk, toes, robot.p_BHip)
+    length = -float(toes[:, 2].min())
+    if file.foot_radius > _MAX_FOOT * length:
         raise InputError(
-            f"Joint {name} is {joint.type_name()}; only revolute ones make a leg."
+            f"foot_radius must be in m, not {file.foot_radius:g} for feet {length:.3g} "
+            "m below the trunk (in millimetres?)."
         )
-    return joint
-
-
-def _check_path(
-    plant: MultibodyPlant, key: str, leg: LegFile, all_joints: tuple[str, ...]
-) -> None:
-    """Raises InputError unless the joints of a leg, and no others, move its foot."""
-    foot = plant.GetFrameByName(leg.foot).body().index()
-
-    def moved(joint: str) -> list[object]:
-        index = plant.GetJointByName(joint).index()
-        return plant.GetBodiesKinematicallyAffectedBy([index])
-
-    moving = [joint for joint in all_joints if foot in moved(joint)]
-    # A joint moves fewer bodies the further it is from the trunk.
-    moving.sort(key=lambda joint: -len(moved(joint)))
-    if moving != leg.joints:
+    low, high = STAND_HEIGHTS
+    if not low <= length + file.foot_radius <= high:
         raise InputError(
-            f"Foot {leg.foot} of leg {key} is moved by the joints "
-            f"{', '.join(moving) or '(none)'}, in this order, "
-            f"not by {', '.join(leg.joints)}."
+            f"In the stance the trunk would be {length:.3g} m over the feet, not "
+            f"{low:g} to {high:g} m (is the URDF in millimetres?)."
+        )
+    return replace(robot, stand_height=file.foot_radius + length)
+
+
+def _check_trunk(trunk: str, toes: Array, hips: Array) -> None:
+    """Raises InputError unless the legs are where their names say in the trunk frame.
+
+    Args:
+        trunk: name of the frame B.
+        toes: in the usual stance in B, m, shape (4, 3).
+        hips: origins of the first joints in B, m, shape (4, 3).
+    """
+    ways = np.stack(
+        (
+            toes[:2].mean(axis=0) - toes[2:].mean(axis=0),
+            toes[0::2].mean(axis=0) - toes[1::2].mean(axis=0),
+            (hips - toes).mean(axis=0),
+        )
+    )
+    # Rows: forward, left, up.
+    R = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-9)
+    if (np.diag(R) < _ALONG).any():
+        if np.linalg.det(R) > _ALONG:
+            # A rotation mends it; its columns are forward, left and up in B.
+            turned = RotationMatrix.ProjectToRotationMatrix(np.rint(R).T)
+            rpy = " ".join(f"{angle:.5g}" for angle in RollPitchYaw(turned).vector())
+            x, y, z = (_axis(row) for row in R)
+            raise InputError(
+                f"The axes of trunk {trunk} must be x forward, y left, z up, but by "
+                f"the feet of the stance forward is {x}, left {y} and up {z}: name a "
+                f'frame of the URDF such as <frame name="trunk" link="{trunk}" '
+                f'rpy="{rpy}"/>, or mend the names of the legs.'
+            )
+        if R[2, 2] < _ALONG:
+            raise InputError(
+                f"In the stance the feet are not below the trunk {trunk}, whose axes "
+                f"must be x forward, y left, z up: up from the feet is {_axis(R[2])}."
+            )
+    middle = toes.mean(axis=0)
+    places = {
+        leg: f"{'front' if x > 0 else 'rear'} {'left' if y > 0 else 'right'}"
+        for leg, (x, y, _) in zip(LEGS, toes - middle, strict=True)
+    }
+    names = dict(
+        zip(LEGS, ("front left", "front right", "rear left", "rear right"), strict=True)
+    )
+    wrong = [
+        f"{leg} is {place}" for leg, place in places.items() if place != names[leg]
+    ]
+    if wrong:
+        raise InputError(
+            f"In the frame of trunk {trunk}, x forward and y left, the feet must lie "
+            f"where the legs' names say, but {', '.join(wrong)}."
+        )
+    if not hips[:2, 0].mean() > 0 > hips[2:, 0].mean():
+        raise InputError(
+            f"The origin of trunk {trunk} must lie between the hips, but the front "
+            f"ones are at x = {hips[:2, 0].mean():.3g} m and the rear ones at "
+            f"{hips[2:, 0].mean():.3g} m."
         )
 
 
-def _limits(legs: list[LegFile], key: str, defaults: list[float]) -> Array:
+def _axis(direction: Array) -> str:
+    """Returns the axis that a direction is nearest to, such as "-x"."""
+    k = int(np.abs(direction).argmax())
+    return f"{'-' if direction[k] < 0 else '+'}{'xyz'[k]}"
+
+
+def _limits(legs: list[LegFile], key: str, defaults: Array) -> Array:
     """Returns the limits of all joints: those of the file, else of the URDF."""
-    count = len(legs[0].joints)
     rows = [
-        getattr(leg, key) or defaults[k * count : (k + 1) * count]
-        for k, leg in enumerate(legs)
+        getattr(leg, key) or own
+        for leg, own in zip(legs, defaults.reshape(4, -1), strict=True)
     ]
     return np.concatenate(rows).astype(np.float64)
-
-
-def _chains(
-    plant: MultibodyPlant, trunk: str, joints: list[RevoluteJoint], feet: list[str]
-) -> tuple[Array, Array, Array]:
-    """Returns axes, origins and toes as :class:`.chains.ChainRobot` has them."""
-    context = plant.CreateDefaultContext()
-    base = plant.GetFrameByName(trunk)
-    for joint in joints:
-        joint.set_angle(context, 0.0)
-    poses = [joint.frame_on_child().CalcPose(context, base) for joint in joints]
-    axes = [
-        X_BJ.rotation() @ joint.revolute_axis()
-        for X_BJ, joint in zip(poses, joints, strict=True)
-    ]
-    toes = [plant.GetFrameByName(f).CalcPose(context, base).translation() for f in feet]
-    origins = [X_BJ.translation() for X_BJ in poses]
-    legs = (4, len(joints) // 4, 3)
-    return np.reshape(axes, legs), np.reshape(origins, legs), np.array(toes)

@@ -54,3 +54,74 @@ def write_robot(path: Path, robot: str) -> Path:
         )
     path.write_text("\n".join(lines) + "\n")
     return path
+
+
+def made_up_urdf(top: str = "", unit: float = 1.0, turn: str = "0 0 0") -> str:
+    """Text of a URDF of a robot with links of .22 m, hips at (+-.2, +-.1) m.
+
+    Args:
+        top: links and joints above the trunk's link, "body".
+        unit: of length in the file, in 1/m.
+        turn: roll, pitch and yaw of all legs in the frame of "body", rad.
+    """
+    hips = {"FL": (0.2, 0.1), "FR": (0.2, -0.1), "RL": (-0.2, 0.1), "RR": (-0.2, -0.1)}
+    lines = [
+        f'<robot name="made_up">{top}<link name="body"/><link name="core"/>',
+        '<joint name="core_joint" type="fixed"><parent link="body"/>'
+        f'<child link="core"/><origin rpy="{turn}"/></joint>',
+    ]
+    for leg, (x, y) in hips.items():
+        parent = "core"
+        for part, (at, axis, lower, upper) in {
+            "hip": ((x, y, 0), "1 0 0", -1, 1),
+            "thigh": ((0, y / 2, 0), "0 1 0", -2, 4),
+            "calf": ((0, 0, -0.22), "0 1 0", -2.7, -0.5),
+            "foot": ((0, 0, -0.22), "", 0, 0),
+        }.items():
+            link = f"{leg}_{part}"
+            xyz = " ".join(str(unit * length) for length in at)
+            kind = (
+                f'type="revolute"><axis xyz="{axis}"/><limit lower="{lower}" '
+                f'upper="{upper}" effort="30" velocity="20"/>'
+                if axis
+                else 'type="fixed">'
+            )
+            lines.append(
+                f'<link name="{link}"/><joint name="{link}_joint" {kind}'
+                f'<parent link="{parent}"/><child link="{link}"/>'
+                f'<origin xyz="{xyz}"/></joint>'
+            )
+            parent = link
+    return "\n".join([*lines, "</robot>"])
+
+
+def write_made_up(
+    path: Path, urdf: str, names: tuple[str, ...] = _LEGS, **fields: str
+) -> Path:
+    """Writes a URDF beside ``path`` and there a YAML file for it; returns ``path``.
+
+    Args:
+        path: of the YAML file.
+        urdf: from :func:`made_up_urdf`, perhaps spoiled.
+        names: the URDF's names of the legs that the file calls FL, FR, RL and RR.
+        fields: other values of urdf, trunk, foot_radius, stand and foot, in YAML.
+    """
+    fields = {
+        "urdf": f"{path.stem}.urdf",
+        "trunk": "body",
+        "foot_radius": "0.02",
+        "stand": "[0, 0.8, -1.6]",
+        "foot": "{}_foot",
+        **fields,
+    }
+    path.with_name(fields["urdf"]).write_text(urdf)
+    lines = [f"{key}: {fields[key]}" for key in ("urdf", "trunk", "foot_radius")]
+    lines.append("legs:")
+    for leg, name in zip(_LEGS, names, strict=True):
+        joints = ", ".join(f"{name}_{part}_joint" for part in ("hip", "thigh", "calf"))
+        foot = fields["foot"].format(name)
+        lines.append(
+            f"  {leg}: {{joints: [{joints}], foot: {foot}, stand: {fields['stand']}}}"
+        )
+    path.write_text("\n".join(lines) + "\n")
+    return path

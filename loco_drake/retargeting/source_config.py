@@ -1,17 +1,15 @@
 """What retargeting needs to know of an animal: one short YAML file for each."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
-from typing import Any
-
-from pydrake.common.yaml import yaml_load_typed
 
 from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.typed_yaml import read_yaml
 
 _FOLDER = Path(__file__).parent / "sources"
 
 
-# Not frozen: yaml_load_typed sets the fields one by one.
 @dataclass(kw_only=True)
 class ContactConfig:
     """When a toe is on the ground; see :mod:`loco_drake.retargeting.contacts`."""
@@ -81,35 +79,19 @@ def read_config(path: Path) -> RetargetConfig:
         InputError: if the file is missing, names an unknown field, or holds a value
             that cannot be.
     """
-    if not Path(path).is_file():
-        raise InputError(f"There is no retargeting configuration {str(path)!r}.")
-    try:
-        config: RetargetConfig = yaml_load_typed(
-            schema=RetargetConfig, filename=str(path), defaults=RetargetConfig()
-        )
-    except Exception as error:  # Drake and PyYAML raise many kinds
-        reason = " ".join(str(error).split())
-        raise InputError(
-            f"{path} is not a retargeting configuration: {reason}"
-        ) from None
-    _check(config, path)
-    return config
-
-
-def _check(config: RetargetConfig, path: Path) -> None:
-    positive = [
-        ("smoothing.base", config.smoothing.base),
-        ("smoothing.toes", config.smoothing.toes),
-        ("swing_height", config.swing_height),
-        ("stance_height", 1.0 if (H := config.stance_height) is None else H),
-        *((f"contact.{name}", value) for name, value in _values(config.contact)),
-    ]
-    for name, value in positive:
+    config = read_yaml(path, RetargetConfig, "a retargeting configuration")
+    above_0 = {
+        "swing_height": config.swing_height,
+        "stance_height": 1.0 if config.stance_height is None else config.stance_height,
+        **{f"smoothing.{key}": value for key, value in vars(config.smoothing).items()},
+        **{f"contact.{key}": value for key, value in vars(config.contact).items()},
+    }
+    for name, value in above_0.items():
         if not 0 < value < float("inf"):
             raise InputError(f"{path}: {name} must be above 0, not {value}.")
+    for name in ("front_hip", "rear_hip", "hip_spread", "base_height_offset"):
+        if not isfinite(value := getattr(config, name)):
+            raise InputError(f"{path}: {name} must be finite, not {value}.")
     if not 0 <= config.stance_height_percentile <= 100:
         raise InputError(f"{path}: stance_height_percentile must be within 0 to 100.")
-
-
-def _values(config: Any) -> list[tuple[str, float]]:
-    return [(item.name, getattr(config, item.name)) for item in fields(config)]
+    return config

@@ -106,7 +106,7 @@ FL = "joints: [FL_HFE, FL_KFE]"
             "moved by the joints FL_HFE, FL_KFE, in this",
         ),
         (("foot: FL_FOOT", "foot: FR_FOOT"), "Foot FR_FOOT of leg FL is moved by the"),
-        ((FL, "joints: [FL_HFE, FL_ANKLE]"), "Joint FL_ANKLE is weld; only revolute"),
+        ((FL, "joints: [FL_HFE, FL_ANKLE]"), "Joint FL_ANKLE is fixed; only revolute"),
         (("lower: [-2.0, -2.8]", "lower: [-2.0]"), "lower of leg FL must be 2 numbers"),
         (("speed: [84, 84]", "speed: [84, 0]"), "speed of leg FL must be above 0"),
         (
@@ -136,7 +136,9 @@ def test_what_is_wrong_is_said_in_one_sentence(tmp_path, change, reason):
 
 
 def test_files_that_are_not_there_or_no_robots(tmp_path):
-    with pytest.raises(InputError, match=r"There is no robot file 'no\.yaml'"):
+    with pytest.raises(
+        InputError, match=r"There is no file 'no\.yaml'; it should be a"
+    ):
         load_robot("no.yaml")
     with pytest.raises(InputError, match="'spot'; the choices are go2, a1, or a robot"):
         load_robot("spot")
@@ -147,8 +149,12 @@ def test_files_that_are_not_there_or_no_robots(tmp_path):
     url = f"package://example-robot-data/{URDF}"
     with pytest.raises(InputError, match="is not XML"):
         load_robot(spoiled(tmp_path, (url, "solo.urdf")))
-    (tmp_path / "solo.urdf").write_text("<robot name='a'><joint name='b'/></robot>")
-    with pytest.raises(InputError, match=r"Drake cannot read solo\.urdf"):
+    (tmp_path / "solo.urdf").write_text(
+        "<robot name='a'><joint type='revolute' name='FL_HFE'/></robot>"
+    )
+    with pytest.raises(
+        InputError, match="Unknown joint 'FL_KFE'; the choices are FL_HFE"
+    ):
         load_robot(spoiled(tmp_path, (url, "solo.urdf")))
 
 

@@ -30,6 +30,7 @@ def test_fields_not_named_keep_their_default(tmp_path):
     [
         ("wings: 2\n", "wings"),
         ("rear_hip: far\n", "far"),
+        ("rear_hip: .inf\n", "rear_hip must be finite"),
         ("{", "not a retargeting configuration"),
         ("smoothing: {toes: 0}\n", "smoothing.toes must be above 0"),
         ("contact: {land_speed: .nan}\n", "contact.land_speed must be above 0"),
@@ -44,5 +45,5 @@ def test_wrong_configuration_is_refused_with_the_reason(tmp_path, text, reason):
 
 
 def test_missing_configuration_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no retargeting configuration"):
+    with pytest.raises(InputError, match="it should be a retargeting config"):
         read_config(tmp_path / "cat.yaml")

@@ -1,0 +1,265 @@
+"""The legs of any robot's URDF, as chains of joints."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.multibody.parsing import PackageMap, Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, RevoluteJoint
+from pydrake.systems.framework import Context
+
+from loco_drake.common.errors import InputError, check_choice
+
+from .legs import LEGS
+from .meshes import vendor_folder
+
+Array = NDArray[np.float64]
+
+_MAX_BYTES = 20_000_000
+_MAX_LENGTH = 1e5  # in the unit of the file; whether it is m is asked later
+# A link beyond the foot, such as a sensor's, reaches at most this share further.
+_FOOT_SHARE = 0.1
+
+# What is left of a URDF: what moves, and how. So it needs no inertias and no meshes.
+_KEPT = {
+    "robot": {"link", "joint", "frame"},
+    "joint": {"parent", "child", "origin", "axis", "limit"},
+}
+
+# Drake welds a link of this name to the world; many files begin with one that a joint
+# of any kind ties to the trunk. Here it is a link like any other.
+_WORLD, _NOT_WORLD = "world", "world_link"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class UrdfLegs:
+    """Four legs of n joints each, their frames where all joints are at zero.
+
+    Attributes:
+        model: URDF text of links and joints alone, in which only the legs' joints move.
+        axes: unit vectors along the joints' axes in B, shape (4, n, 3).
+        origins: of the joints in B, m, shape (4, n, 3).
+        toes: origins of the foot frames in B, m, shape (4, 3).
+        lower: position limits, rad, shape (4 n,).
+        upper: position limits, rad, shape (4 n,).
+        speed: limits, rad/s, shape (4 n,).
+    """
+
+    model: str
+    axes: Array
+    origins: Array
+    toes: Array
+    lower: Array
+    upper: Array
+    speed: Array
+
+
+def find_urdf(url: str, folder: Path) -> Path:
+    """Returns the path of a URDF, which exists.
+
+    Args:
+        url: a path relative to ``folder``, or package://NAME/..., where NAME is
+            example-robot-data or lies below a folder of ROS_PACKAGE_PATH.
+        folder: where a relative path begins.
+
+    Raises:
+        InputError: if there is no such package or file.
+    """
+    if url.startswith("package://"):
+        packages = PackageMap.MakeEmpty()
+        packages.PopulateFromRosPackagePath()
+        packages.Add("example-robot-data", str(vendor_folder()))
+        package, _, inside = url.removeprefix("package://").partition("/")
+        check_choice("package", package, packages.GetPackageNames())
+        found = Path(packages.GetPath(package)) / inside
+    else:
+        found = folder / url
+    if not found.is_file():
+        raise InputError(f"There is no URDF {str(found)!r}.")
+    return found
+
+
+def read_legs(
+    path: Path,
+    trunk: str,
+    joints: Sequence[Sequence[str]],
+    feet: Sequence[str],
+    stand: Array,
+) -> UrdfLegs:
+    """Returns the legs in a URDF.
+
+    Args:
+        path: the file.
+        trunk: name of the frame B.
+        joints: of each leg, from the trunk to the toe; all others stay at zero.
+        feet: names of the frames at the toes.
+        stand: joints of the usual stance, rad, shape (4 n,).
+
+    Raises:
+        InputError: naming what is missing or impossible.
+    """
+    names = [name for leg in joints for name in leg]
+    root = _read_xml(path)
+    types = {str(j.get("name")): j.get("type") for j in root.iterfind("joint")}
+    for name in names:
+        kind = types[check_choice("joint", name, types)]
+        if kind not in ("revolute", "continuous"):
+            raise InputError(f"Joint {name} is {kind}; only revolute ones make a leg.")
+    _check_independent(root, feet)
+    model = _strip(root, names)
+    plant = MultibodyPlant(time_step=0.0)
+    try:
+        Parser(plant).AddModelsFromString(model, "urdf")
+    except (RuntimeError, ValueError) as error:
+        reason = " ".join(str(error).split())[:300]
+        raise InputError(f"Drake cannot read {path.name}: {reason}") from None
+    # Drake adds frames of its own, which nobody means.
+    frames = [str(tag.get("name")) for tag in root if tag.tag in ("link", "frame")]
+    check_choice("trunk", trunk, frames)
+    for foot in feet:
+        check_choice("foot", foot, frames)
+    plant.Finalize()
+    moving: list[RevoluteJoint] = [plant.GetJointByName(name) for name in names]
+    for leg, foot, own in zip(LEGS, feet, joints, strict=True):
+        _check_path(plant, leg, foot, own, names)
+    context = plant.CreateDefaultContext()
+    base = plant.GetFrameByName(trunk)
+    for joint in moving:
+        joint.set_angle(context, 0.0)
+    poses = [joint.frame_on_child().CalcPose(context, base) for joint in moving]
+    axes = [
+        X_BJ.rotation() @ joint.revolute_axis()
+        for X_BJ, joint in zip(poses, moving, strict=True)
+    ]
+    origins = [X_BJ.translation() for X_BJ in poses]
+    toes = [plant.GetFrameByName(f).CalcPose(context, base).translation() for f in feet]
+    if not (np.abs([*origins, *toes]) < _MAX_LENGTH).all():
+        raise InputError(f"{path.name} has joints more than {_MAX_LENGTH:g} m away.")
+    for joint, angle in zip(moving, stand, strict=True):
+        joint.set_angle(context, angle)
+    for foot, own in zip(feet, joints, strict=True):
+        _check_end(plant, context, root, foot, own[0])
+    return UrdfLegs(
+        model=model,
+        axes=np.reshape(axes, (4, -1, 3)),
+        origins=np.reshape(origins, (4, -1, 3)),
+        toes=np.array(toes),
+        lower=np.array([joint.position_lower_limits()[0] for joint in moving]),
+        upper=np.array([joint.position_upper_limits()[0] for joint in moving]),
+        speed=np.array([joint.velocity_upper_limits()[0] for joint in moving]),
+    )
+
+
+def _read_xml(path: Path) -> ET.Element:
+    if path.stat().st_size > _MAX_BYTES:
+        raise InputError(f"{path} is no URDF: it has more than 20 MB.")
+    try:
+        root = ET.parse(path).getroot()
+    except (ET.ParseError, ValueError, LookupError, RecursionError) as error:
+        raise InputError(f"{path} is not XML: {error}.") from None
+    others = {"sdf": "an SDF file", "mujoco": "an MJCF file of MuJoCo"}
+    kind = others.get(root.tag, f"XML whose root is {root.tag[:60]!r}, not 'robot'")
+    if root.tag != "robot":
+        raise InputError(f"{path} is {kind}; only URDF is read.")
+    if any(
+        "xacro" in str(element.tag) or "${" in "".join(element.attrib.values())
+        for element in root.iter()
+    ):
+        raise InputError(
+            f"{path} is a xacro file, not URDF yet: expand it with "
+            f"'xacro {path.name} > {path.name.split('.')[0]}.urdf'."
+        )
+    return root
+
+
+def _check_independent(root: ET.Element, feet: Sequence[str]) -> None:
+    """Raises InputError if a joint on the way to a foot follows another joint."""
+    link_of = {f.get("name"): f.get("link") for f in root.iterfind("frame")}
+    above = {_end(joint, "child"): joint for joint in root.iterfind("joint")}
+    for foot in feet:
+        link, seen = link_of.get(foot, foot), set()
+        while link in above and link not in seen:
+            seen.add(link)
+            joint = above[link]
+            mimic = joint.find("mimic")
+            if mimic is not None:
+                raise InputError(
+                    f"Joint {joint.get('name')}, on the way to foot {foot}, mimics "
+                    f"{mimic.get('joint')}; a leg's joints must move on their own."
+                )
+            link = _end(joint, "parent")
+
+
+def _end(joint: ET.Element, tag: str) -> str | None:
+    element = joint.find(tag)
+    return None if element is None else element.get("link")
+
+
+def _strip(root: ET.Element, joints: Sequence[str]) -> str:
+    """Returns ``root`` stripped to links and joints, of which only ``joints`` move."""
+    for element in [root, *root.iterfind("joint"), *root.iterfind("link")]:
+        for child in list(element):
+            if child.tag not in _KEPT.get(element.tag, set()):
+                element.remove(child)
+    for element in root.iter():
+        for key in ("name", "link"):
+            if element.tag != "joint" and element.get(key) == _WORLD:
+                element.set(key, _NOT_WORLD)
+    for joint in root.iterfind("joint"):
+        if joint.get("name") not in joints:
+            joint.set("type", "fixed")
+    return ET.tostring(root, encoding="unicode")
+
+
+def _check_path(
+    plant: MultibodyPlant,
+    leg: str,
+    foot: str,
+    joints: Sequence[str],
+    all_joints: Sequence[str],
+) -> None:
+    """Raises InputError unless the joints of a leg, and no others, move its foot."""
+    body = plant.GetFrameByName(foot).body().index()
+
+    def moved(joint: str) -> list[object]:
+        index = plant.GetJointByName(joint).index()
+        return plant.GetBodiesKinematicallyAffectedBy([index])
+
+    moving = [joint for joint in all_joints if body in moved(joint)]
+    # A joint moves fewer bodies the further it is from the trunk.
+    moving.sort(key=lambda joint: -len(moved(joint)))
+    if moving != list(joints):
+        raise InputError(
+            f"Foot {foot} of leg {leg} is moved by the joints "
+            f"{', '.join(moving) or '(none)'}, in this order, "
+            f"not by {', '.join(joints)}."
+        )
+
+
+def _check_end(
+    plant: MultibodyPlant, context: Context, root: ET.Element, foot: str, hip: str
+) -> None:
+    """Raises InputError if a link of the leg reaches further than its foot."""
+    frame, start = plant.GetFrameByName(foot), plant.GetJointByName(hip)
+
+    def reach(point: Frame) -> float:
+        X_HP = point.CalcPose(context, start.frame_on_parent())
+        return float(np.linalg.norm(X_HP.translation()))
+
+    below: dict[str | None, list[str | None]] = {}
+    for joint in root.iterfind("joint"):
+        below.setdefault(_end(joint, "parent"), []).append(_end(joint, "child"))
+    links = [frame.body().name()]
+    for link in links:  # grows
+        links += below.get(link, [])
+    furthest = max(links, key=lambda link: reach(plant.GetFrameByName(link)))
+    beyond = reach(plant.GetFrameByName(furthest)) - reach(frame)
+    if beyond > _FOOT_SHARE * reach(frame):
+        raise InputError(
+            f"Foot {foot} is not the end of its leg: link {furthest} reaches "
+            f"{beyond:.3g} m further."
+        )
