@@ -12,7 +12,7 @@ import tyro
 from loco_drake.common.files import atomic_path
 from loco_drake.evaluation.dataset_picture import describe, library_figure
 from loco_drake.motion.gaits import LABELS
-from loco_drake.motion.motion import load_motion
+from loco_drake.motion.motion_file import load_motion
 
 
 def main(png: tyro.conf.Positional[Path], motions: Path = Path("motions/go2")) -> None:

@@ -17,7 +17,7 @@ from loco_drake.control.plan import Plan, plan_from_motion
 from loco_drake.models.plant import AddRobotPlant
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.models.shipped import policy_path
-from loco_drake.motion.motion import load_motion
+from loco_drake.motion.motion_file import load_motion
 
 from .actuation import Actuation
 from .joint_targets import JointTargets

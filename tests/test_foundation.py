@@ -7,7 +7,14 @@ import torch
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import atomic_path, cache_dir
 from loco_drake.common.weights import load_into, load_weights, save_weights
-from loco_drake.motion.gaits import GAITS, LABELS, ONE_HOT, SOURCES, parse_label
+from loco_drake.motion.gaits import (
+    GAITS,
+    LABELS,
+    ONE_HOT,
+    SOURCES,
+    GaitLabel,
+    parse_label,
+)
 from loco_drake.motion.keypoints import KeypointClip
 
 
@@ -26,12 +33,30 @@ def test_labels_are_written_and_read():
 
 
 def test_one_hots_are_two():
-    assert ONE_HOT.shape == (15, 12)
+    assert ONE_HOT.shape == (45, 12)
     row = ONE_HOT[parse_label("mpc-bound").index]
     assert set(np.flatnonzero(row)) == {
         SOURCES.index("mpc"),
         len(SOURCES) + GAITS.index("bound"),
     }
+
+
+@pytest.mark.parametrize(
+    ("source", "gait", "columns"),
+    [
+        ("dog", "walk", [0, 4 + 3]),
+        ("elephant", "walk", [4 + 3]),
+        ("horse", "canter", [1]),
+        ("several", "gaits", []),
+    ],
+)
+def test_labels_beyond_the_fifteen_keep_the_columns_that_are_known(
+    source, gait, columns
+):
+    """Shipped networks have no input for what they have never seen."""
+    row = GaitLabel(source, gait).index
+    assert row >= len(LABELS)
+    assert np.flatnonzero(ONE_HOT[row]).tolist() == columns
 
 
 def clip(**changes):
@@ -47,7 +72,8 @@ def clip(**changes):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"source": "cat"}, "dog, horse, mpc, solo8"),
+        ({"source": "c\nat"}, r"A source must have .* not be 'c\\nat'"),
+        ({"gait": ""}, "A gait must have 1 to 64"),
         ({"fps": 0.0}, "rate above 0"),
         ({"hip": np.zeros((4, 3))}, "hip .* must have shape"),
         ({"toes": np.full((5, 4, 3), np.inf)}, "NaN or infinity"),

@@ -31,7 +31,8 @@ from loco_drake.generation.motion_model import MotionModel, load_motion_model
 from loco_drake.models.robots import ROBOTS, Robot, get_robot
 from loco_drake.models.shipped import pretrained_path
 from loco_drake.motion.gaits import LABELS, SOURCES, parse_label
-from loco_drake.motion.motion import FPS, Motion, load_motion
+from loco_drake.motion.motion import FPS, Motion
+from loco_drake.motion.motion_file import load_motion
 
 
 @dataclass(kw_only=True)

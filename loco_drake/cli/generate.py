@@ -7,7 +7,8 @@ from pathlib import Path
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import check_at_least, check_choice
 from loco_drake.motion.gait_schedule import parse_schedule
-from loco_drake.motion.motion import FPS, save_motion
+from loco_drake.motion.motion import FPS
+from loco_drake.motion.motion_file import save_motion
 
 BATCH = 32  # motions side by side
 

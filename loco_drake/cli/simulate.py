@@ -13,7 +13,8 @@ from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import atomic_path
 from loco_drake.motion.gait_schedule import parse_schedule
-from loco_drake.motion.motion import Motion, load_motion
+from loco_drake.motion.motion import Motion
+from loco_drake.motion.motion_file import load_motion
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat

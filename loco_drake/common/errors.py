@@ -1,13 +1,54 @@
 """The error that a user can cause and mend."""
 
+import re
 from collections.abc import Iterable
+
+_LONGEST_WORD = 300  # a path may be as long; what is longer is no word
+_LONGEST_NAME = 64
 
 
 class InputError(ValueError):
     """Bad input: the message is one sentence that names the valid choices.
 
-    The command line prints it without a traceback and exits with status 2.
+    The command line prints it without a traceback and exits with status 2. Whatever
+    the message quotes, it is one line of printable text: see :func:`one_line`.
     """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
+
+
+def one_line(text: str) -> str:
+    """Returns ``text`` with control characters escaped and endless words shortened."""
+    line = "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
+    )
+    endless = rf"\S{{{_LONGEST_WORD},}}"
+    return re.sub(endless, lambda word: f"{word[0][:99]}...{word[0][-99:]}", line)
+
+
+def quoted(value: object) -> str:
+    """Returns what a user wrote, as messages quote it: escaped, at most 64 letters.
+
+    For everything that comes from a file or the command line and is not a path.
+    """
+    text = str(value)
+    cut = text if len(text) <= _LONGEST_NAME else f"{text[: _LONGEST_NAME - 3]}..."
+    return repr(cut)
+
+
+def check_name(what: str, value: str) -> str:
+    """Returns ``value`` if it can name something in files, messages and file names.
+
+    Raises:
+        InputError: unless it has 1 to 64 printable characters, and no "/".
+    """
+    if not (0 < len(value) <= _LONGEST_NAME and value.isprintable()) or "/" in value:
+        raise InputError(
+            f"A {what} must have 1 to {_LONGEST_NAME} printable characters and no "
+            f"slash, not be {quoted(value)}."
+        )
+    return value
 
 
 def check_choice(what: str, value: str, choices: Iterable[str]) -> str:
@@ -19,7 +60,7 @@ def check_choice(what: str, value: str, choices: Iterable[str]) -> str:
     choices = list(choices)
     if value not in choices:
         raise InputError(
-            f"Unknown {what} {value!r}; the choices are {', '.join(choices)}."
+            f"Unknown {what} {quoted(value)}; the choices are {', '.join(choices)}."
         )
     return value
 

@@ -52,7 +52,7 @@ class Preview:
         q: positions as in :class:`Plan`, shape (..., K, 19).
         v: velocities as in :class:`Plan`, shape (..., K, 18).
         contacts: shape (..., K, 4).
-        label: index into :data:`loco_drake.motion.gaits.LABELS` of the present,
+        label: row of :data:`loco_drake.motion.gaits.ONE_HOT` of the present,
             shape (...).
     """
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import quat_conjugate, quat_rotate, yaw_of, yaw_quat
 from loco_drake.models.robots import Robot
-from loco_drake.motion.gaits import LABELS, parse_label
+from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.motion.motion import FPS, Motion
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ class Plan:
         vdot: accelerations, the time derivatives of ``v``, shape (N, 6 + J).
         p_WF: centres of the toe spheres in m, shape (N, 4, 3).
         contacts: whether each foot is meant to be on the ground, shape (N, 4).
-        labels: index into :data:`loco_drake.motion.gaits.LABELS`, shape (N,).
+        labels: row of :data:`loco_drake.motion.gaits.ONE_HOT`, shape (N,).
         path_time: seconds of the unsmoothed motion that have passed, shape (N,);
             the smoother slows this clock down where the robot cannot follow.
         open_ended: whether whoever made the plan will write more of it.
@@ -104,9 +104,9 @@ class Plan:
                 "A plan's q must begin with unit quaternions w, x, y, z; one has the "
                 f"length {norms[np.abs(norms - 1).argmax()]:.4g}."
             )
-        if self.labels.min() < 0 or self.labels.max() >= len(LABELS):
+        if self.labels.min() < 0 or self.labels.max() >= len(ROW_LABELS):
             raise InputError(
-                f"A plan's labels must be indices from 0 to {len(LABELS) - 1}."
+                f"A plan's labels must be indices from 0 to {len(ROW_LABELS) - 1}."
             )
         if (np.diff(self.path_time) < 0).any():
             raise InputError("A plan's path_time must never decrease.")
@@ -182,7 +182,7 @@ def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> P
 
     Raises:
         InputError: if the motion is not at :data:`loco_drake.motion.motion.FPS`, is of
-            another robot, or of a gait that is none of the fifteen.
+            another robot, or has other joints.
     """
     if motion.fps != FPS:
         raise InputError(
@@ -195,7 +195,6 @@ def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> P
             f"The joints of the motion are not those of {robot.name}: "
             f"{', '.join(robot.joint_names)}."
         )
-    label = parse_label(str(motion.label))
     return make_plan(
         robot,
         q=np.hstack(
@@ -209,7 +208,7 @@ def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> P
             )
         ),
         contacts=motion.contacts,
-        labels=np.full(len(motion), label.index),
+        labels=motion.label_indices,
         start_time=start_time,
     )
 

@@ -12,7 +12,8 @@ from loco_drake.datasets.split import VALIDATION, Split
 from loco_drake.evaluation.samples import FRAMES
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.motion.gaits import LABELS
-from loco_drake.motion.motion import Motion, load_motion
+from loco_drake.motion.motion import Motion
+from loco_drake.motion.motion_file import load_motion
 from loco_drake.retargeting.batch import SegmentRetargeter
 
 

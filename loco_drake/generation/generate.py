@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from loco_drake.common.errors import InputError
 from loco_drake.generation.motion_model import MotionModel
 from loco_drake.motion.gait_schedule import GaitSchedule
-from loco_drake.motion.gaits import GaitLabel
+from loco_drake.motion.gaits import ROW_LABELS, GaitLabel
 from loco_drake.motion.motion import FPS, Motion
 
 Integers = NDArray[np.int64]
@@ -34,7 +34,7 @@ def generate_motions(
         model: from
             :func:`.motion_model.pretrained_motion_model` or one's own training.
         gait: one that the generator was trained on, or several after each other.
-            The motion's label is then SEVERAL; its provenance says which.
+            The motion's label is then SEVERAL; ``gait_changes`` says which.
         duration: from first to last frame, in s, at most LONGEST_DURATION.
         seeds: not negative; each motion depends on its own only.
         temperature: see :meth:`MotionModel.extend`.
@@ -64,6 +64,9 @@ def generate_motions(
     q = np.concatenate([part.q for part in parts], axis=1)[:, :count]
     v = np.concatenate([part.v for part in parts], axis=1)[:, :count]
     contacts = np.concatenate([part.contacts for part in parts], axis=1)[:, :count]
+    rows = np.concatenate([part.labels[0] for part in parts])[:count]
+    changes = [0, *(np.flatnonzero(np.diff(rows)) + 1).tolist()]
+    gait_changes = tuple((k, ROW_LABELS[rows[k]]) for k in changes)
     return [
         Motion(
             robot=model.robot.name,
@@ -86,6 +89,7 @@ def generate_motions(
                 "pace": f"{stream.pace[i]:.4g}",
                 "tokenizer": model.tokenizer.fingerprint,
             },
+            gait_changes=gait_changes if label == SEVERAL else (),
         )
         for i, seed in enumerate(seeds)
     ]

@@ -19,7 +19,7 @@ from loco_drake.generation.speed_rank import drawn_rank, rank_bin
 from loco_drake.generation.tokenizer import Tokenizer, load_tokenizer
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.models.shipped import pretrained_path
-from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.gaits import LABELS, ROW_LABELS
 from loco_drake.motion.motion import FPS
 
 Array = NDArray[np.float64]
@@ -312,7 +312,7 @@ class MotionModel:
         """Raises InputError if the weights were not trained on one of ``labels``."""
         unknown = sorted(set(labels.ravel().tolist()) - self._known)
         if unknown:
-            names = [str(LABELS[i]) if i < len(LABELS) else str(i) for i in unknown]
+            names = [str(ROW_LABELS[i]) for i in unknown]
             raise InputError(
                 f"The generator was not trained on {', '.join(names)}; "
                 f"it was on {', '.join(self.generator.config.labels)}."

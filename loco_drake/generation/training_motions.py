@@ -12,7 +12,8 @@ from loco_drake.datasets.split import VALIDATION
 from loco_drake.generation.features import motion_features
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS, GaitLabel
-from loco_drake.motion.motion import Motion, load_motion
+from loco_drake.motion.motion import Motion
+from loco_drake.motion.motion_file import load_motion
 
 Array = NDArray[np.float64]
 

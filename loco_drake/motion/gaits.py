@@ -3,28 +3,40 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from loco_drake.common.errors import check_choice
+from loco_drake.common.errors import check_choice, check_name
 
+# What shipped networks have an input for. Not a list of what there may be: any other
+# source or gait has no input of its own, so that these never change.
 SOURCES = ("dog", "horse", "mpc", "solo8")
 GAITS = ("pace", "trot", "gallop", "walk", "bound", "crawl", "stilt", "wave")
+OTHER = "other"
 
 
 @dataclass(frozen=True, order=True)
 class GaitLabel:
-    """A (source, gait) pair, written ``source-gait``, such as ``dog-trot``."""
+    """A (source, gait) pair, written ``source-gait``, such as ``dog-trot``.
+
+    Raises:
+        InputError: if either is no name, see :func:`.errors.check_name`.
+    """
 
     source: str
     gait: str
+
+    def __post_init__(self) -> None:
+        check_name("source", self.source)
+        check_name("gait", self.gait)
 
     def __str__(self) -> str:
         return f"{self.source}-{self.gait}"
 
     @property
     def index(self) -> int:
-        """Position in :data:`LABELS`; what networks and plans store."""
-        return LABELS.index(self)
+        """Row of :data:`ONE_HOT`; what networks and plans store."""
+        source = self.source if self.source in SOURCES else OTHER
+        gait = self.gait if self.gait in GAITS else OTHER
+        return ROW_LABELS.index(GaitLabel(source, gait))
 
 
 # The fifteen of the paper, Section IV.
@@ -39,7 +51,24 @@ LABELS = tuple(
     for gait in gaits
 )
 
-ONE_HOT_SIZE = len(SOURCES) + len(GAITS)
+# What the rows of ONE_HOT stand for: the fifteen, then all other pairs.
+ROW_LABELS = LABELS + tuple(
+    label
+    for source in (*SOURCES, OTHER)
+    for gait in (*GAITS, OTHER)
+    if (label := GaitLabel(source, gait)) not in LABELS
+)
+
+# One-hot of the source, then one-hot of the gait; OTHER is zero in all columns.
+ONE_HOT = np.array(
+    [
+        [float(label.source == source) for source in SOURCES]
+        + [float(label.gait == gait) for gait in GAITS]
+        for label in ROW_LABELS
+    ]
+)
+ONE_HOT.setflags(write=False)
+ONE_HOT_SIZE = ONE_HOT.shape[1]
 
 
 def parse_label(text: str) -> GaitLabel:
@@ -50,16 +79,3 @@ def parse_label(text: str) -> GaitLabel:
     """
     names = [str(label) for label in LABELS]
     return LABELS[names.index(check_choice("gait", text, names))]
-
-
-def _one_hot_table() -> NDArray[np.float64]:
-    table = np.zeros((len(LABELS), ONE_HOT_SIZE))
-    for row, label in zip(table, LABELS, strict=True):
-        row[SOURCES.index(label.source)] = 1.0
-        row[len(SOURCES) + GAITS.index(label.gait)] = 1.0
-    table.setflags(write=False)
-    return table
-
-
-# Rows in the order of LABELS: one-hot of the source, then one-hot of the gait.
-ONE_HOT = _one_hot_table()

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.errors import InputError
 from loco_drake.models.legs import MIRROR_LEGS, MIRROR_POLAR
-from loco_drake.motion.gaits import SOURCES
+from loco_drake.motion.gaits import GaitLabel
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class KeypointClip:
     :mod:`loco_drake.retargeting` needs of an animal or robot and all that it gets.
 
     Attributes:
-        source: one of :data:`loco_drake.motion.gaits.SOURCES`.
+        source: name of the animal or robot, such as dog; need not be a known one.
         gait: name of the gait; need not be one of the fifteen labels.
         fps: frames per second of the arrays, the source's own rate.
         withers: position of the withers, shape (T, 3).
@@ -36,7 +36,7 @@ class KeypointClip:
     provenance: dict[str, str]
 
     def __post_init__(self) -> None:
-        check_choice("source", self.source, SOURCES)
+        GaitLabel(self.source, self.gait)  # checks the names
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise InputError(
                 f"A keypoint clip needs a rate above 0 frames/s, not {self.fps}."

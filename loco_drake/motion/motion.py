@@ -1,15 +1,11 @@
-"""Motion of one robot at a constant rate, in memory and on disk."""
+"""Motion of one robot at a constant rate."""
 
-import json
-import zipfile
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.common.errors import InputError
-from loco_drake.common.files import atomic_path
+from loco_drake.common.errors import InputError, check_name
 from loco_drake.common.rotations import angular_velocity, quat_continuous
 from loco_drake.models.legs import (
     MIRROR_AXIAL,
@@ -22,7 +18,6 @@ from loco_drake.models.legs import (
 from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.keypoints import mirrored_provenance
 
-SCHEMA_VERSION = 1
 FPS = 50.0  # the rate of every Motion that this project writes, and of the policy
 
 UNITS = {
@@ -45,8 +40,7 @@ class Motion:
 
     Attributes:
         robot: name of the robot, as in :func:`loco_drake.models.robots.get_robot`.
-        source: where the motion comes from, see
-            :data:`loco_drake.motion.gaits.SOURCES`.
+        source: what the motion was recorded of, such as dog.
         gait: name of the gait.
         fps: frames per second.
         joint_names: names of the J joints.
@@ -58,6 +52,8 @@ class Motion:
         joint_velocities: rad/s, shape (T, J).
         contacts: whether each foot is on the ground, bool, shape (T, 4).
         provenance: where the motion comes from, as text.
+        gait_changes: where the gait changes on the way: first frame and label of each
+            gait, the first at frame 0; empty if ``label`` holds throughout.
     """
 
     robot: str
@@ -73,6 +69,7 @@ class Motion:
     joint_velocities: NDArray[np.float64]
     contacts: NDArray[np.bool_]
     provenance: dict[str, str] = field(default_factory=dict)
+    gait_changes: tuple[tuple[int, GaitLabel], ...] = ()
 
     def __post_init__(self) -> None:
         _check(self)
@@ -90,9 +87,21 @@ class Motion:
         """Seconds from the first frame to the last."""
         return (len(self) - 1) / self.fps
 
+    @property
+    def label_indices(self) -> NDArray[np.int64]:
+        """Row of :data:`loco_drake.motion.gaits.ONE_HOT` of each frame, shape (T,)."""
+        changes = self.gait_changes or ((0, self.label),)
+        starts = [start for start, _ in changes]
+        place = np.searchsorted(starts, np.arange(len(self)), side="right") - 1
+        return np.array([label.index for _, label in changes])[place]
+
     def slice(self, start: int, end: int) -> "Motion":
         """Returns frames ``start`` to ``end`` (exclusive)."""
-        return replace(self, **{name: getattr(self, name)[start:end] for name in UNITS})
+        arrays = {name: getattr(self, name)[start:end] for name in UNITS}
+        begun = [change for change in self.gait_changes if change[0] <= start]
+        later = [change for change in self.gait_changes if start < change[0] < end]
+        changes = tuple((max(k - start, 0), label) for k, label in begun[-1:] + later)
+        return replace(self, **arrays, gait_changes=changes)
 
     def mirrored(self) -> "Motion":
         """Returns the motion reflected in the plane y = 0 (left for right).
@@ -155,74 +164,12 @@ def make_motion(
     )
 
 
-def save_motion(motion: Motion, path: Path) -> None:
-    """Writes ``motion`` to a ``.npz`` that describes itself, wholly or not at all."""
-    header = {
-        "schema_version": SCHEMA_VERSION,
-        "robot": motion.robot,
-        "source": motion.source,
-        "gait": motion.gait,
-        "fps": motion.fps,
-        "joint_names": list(motion.joint_names),
-        "units": UNITS,
-        "provenance": motion.provenance,
-    }
-    path = Path(path)
-    if path.suffix != ".npz":
-        raise InputError(f"A Motion file must be named *.npz, not {path.name!r}.")
-    with atomic_path(path) as temporary:
-        arrays = {name: getattr(motion, name) for name in UNITS}
-        np.savez_compressed(temporary, header=json.dumps(header), **arrays)
-
-
-def load_motion(path: Path) -> Motion:
-    """Reads a Motion file.
-
-    Raises:
-        InputError: if the file is missing, damaged, of a newer schema, or fails a
-            check of :class:`Motion`.
-    """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"There is no Motion file {str(path)!r}.")
-    try:
-        # numpy leaves a file open that it cannot read.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        header = json.loads(str(arrays.pop("header")))
-        version = int(header["schema_version"])
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
-        raise InputError(
-            f"{path} is not a Motion file: it must be an .npz with a JSON header."
-        ) from None
-    if version > SCHEMA_VERSION:
-        raise InputError(
-            f"{path} has Motion schema {version}; "
-            f"this version reads up to {SCHEMA_VERSION}."
-        )
-    required = ("robot", "source", "gait", "fps", "joint_names")
-    missing = [name for name in required if name not in header]
-    missing += [name for name in UNITS if name not in arrays]
-    if missing:
-        raise InputError(f"{path} lacks {', '.join(missing)}.")
-    try:
-        return Motion(
-            robot=str(header["robot"]),
-            source=str(header["source"]),
-            gait=str(header["gait"]),
-            fps=float(header["fps"]),
-            joint_names=tuple(str(name) for name in header["joint_names"]),
-            provenance={k: str(v) for k, v in header.get("provenance", {}).items()},
-            **{name: arrays[name] for name in UNITS},
-        )
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    except (TypeError, ValueError, AttributeError):
-        raise InputError(f"{path} has a damaged Motion header.") from None
-
-
 def _check(motion: Motion) -> None:
     """Raises InputError, in one sentence, unless ``motion`` is sound."""
+    check_name("robot", motion.robot)
+    starts = [start for start, _ in motion.gait_changes]
+    if starts and (starts[0] != 0 or sorted(set(starts)) != starts):
+        raise InputError("The gaits of a motion must begin at rising frames from 0 on.")
     if not (np.isfinite(motion.fps) and motion.fps > 0):
         raise InputError(f"A motion needs a rate above 0 frames/s, not {motion.fps}.")
     frames = len(motion.base_position)

@@ -13,7 +13,8 @@ from loco_drake.models.quadruped import Quadruped
 from loco_drake.models.robot_files import load_robot
 from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.keypoints import KeypointClip
-from loco_drake.motion.motion import FPS, Motion, save_motion
+from loco_drake.motion.motion import FPS, Motion
+from loco_drake.motion.motion_file import save_motion
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import RetargetReport, retarget_clip
 from loco_drake.retargeting.trajectories import Stretch

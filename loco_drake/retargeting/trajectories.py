@@ -15,7 +15,8 @@ import numpy as np
 from loco_drake.common.errors import InputError
 from loco_drake.datasets.split import TRAIN, VALIDATION
 from loco_drake.motion.gaits import LABELS, GaitLabel
-from loco_drake.motion.motion import FPS, Motion, load_motion, save_motion
+from loco_drake.motion.motion import FPS, Motion
+from loco_drake.motion.motion_file import load_motion, save_motion
 
 SECONDS = 2.0
 

@@ -10,7 +10,8 @@ from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import parse_label
-from loco_drake.motion.motion import Motion, load_motion
+from loco_drake.motion.motion import Motion
+from loco_drake.motion.motion_file import load_motion
 from loco_drake.systems.toppra_smoother import smooth_plan
 
 

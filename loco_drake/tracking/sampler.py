@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.control.plan import Plan
-from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.gaits import ROW_LABELS
 
 _MEMORY = 0.98  # weight of the past in a label's score, per episode
 _PLAN_MEMORY = 0.6  # the same of a plan's score: it is drawn seldom
@@ -37,9 +37,9 @@ class PlanSampler:
         self._labels = np.array([int(plan.labels[0]) for plan in plans])
         self.present = np.unique(self._labels)
         # Mean normalized return of recent episodes, 0 to 1, by label.
-        self.scores: NDArray[np.float64] = np.zeros(len(LABELS))
+        self.scores: NDArray[np.float64] = np.zeros(len(ROW_LABELS))
         # Mean share of their steps that recent episodes made, by label.
-        self.shares: NDArray[np.float64] = np.ones(len(LABELS))
+        self.shares: NDArray[np.float64] = np.ones(len(ROW_LABELS))
         # The same by plan, NaN where it has not been drawn.
         self.plan_scores: NDArray[np.float64] = np.full(len(plans), np.nan)
         self.plan_shares: NDArray[np.float64] = np.full(len(plans), np.nan)
@@ -87,7 +87,7 @@ class PlanSampler:
             i: self.plan_scores[drawn & (self._labels == i)] for i in self.present
         }
         return {
-            str(LABELS[i]): 100 * float(own.mean()) if len(own) else 0.0
+            str(ROW_LABELS[i]): 100 * float(own.mean()) if len(own) else 0.0
             for i, own in scores.items()
         }
 

@@ -17,7 +17,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.control.actor import ActorConfig, save_actor
 from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
 from loco_drake.control.plan import Plan
-from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.tracking.checkpoint import (
     load_checkpoint,
     restore,
@@ -254,7 +254,7 @@ class _Saver(BaseCallback):
                 "training": asdict(self._config),
             },
         )
-        labels = [str(LABELS[i]) for i in self._sampler.present]
+        labels = [str(ROW_LABELS[i]) for i in self._sampler.present]
         actor_config = ActorConfig(
             robot=self._config.environment.robot,
             labels=labels,

@@ -15,7 +15,7 @@ from loco_drake.evaluation.recorded import retarget_recordings
 from loco_drake.generation.generator import save_generator
 from loco_drake.generation.tokenizer import save_tokenizer
 from loco_drake.models.robots import get_robot
-from loco_drake.motion.motion import save_motion
+from loco_drake.motion.motion_file import save_motion
 from tests.synthetic import write_dog_recording
 from tests.synthetic_motion import synthetic_motion
 from tests.tiny_model import make_tiny_model

@@ -13,7 +13,7 @@ from loco_drake.control.actor import Actor, ActorConfig, save_actor
 from loco_drake.generation.tokenizer import save_tokenizer
 from loco_drake.models.shipped import pretrained_path
 from loco_drake.motion.gaits import LABELS
-from loco_drake.motion.motion import save_motion
+from loco_drake.motion.motion_file import save_motion
 from tests.synthetic_motion import synthetic_motion
 from tests.tiny_model import make_tiny_model
 

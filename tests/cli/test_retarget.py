@@ -8,7 +8,7 @@ from loco_drake.cli.retarget import Retarget
 from loco_drake.common.errors import InputError
 from loco_drake.models.robot_files import load_robot
 from loco_drake.models.robots import get_robot
-from loco_drake.motion.motion import load_motion
+from loco_drake.motion.motion_file import load_motion
 from tests.robot_files import SOLO8
 from tests.synthetic_horse import make_horse, write_world_recording
 from tests.synthetic_robots import write_mpc_recording, write_solo8_recording

@@ -7,7 +7,7 @@ import torch
 
 from loco_drake.cli.main import main
 from loco_drake.control.actor import Actor, ActorConfig, save_actor
-from loco_drake.motion.motion import save_motion
+from loco_drake.motion.motion_file import save_motion
 from tests.synthetic_motion import synthetic_motion
 
 KEYS = {

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from loco_drake.motion.motion import save_motion
+from loco_drake.motion.motion_file import save_motion
 from tests.synthetic_motion import synthetic_motion
 
 

@@ -15,7 +15,7 @@ from loco_drake.models.robots import ROBOTS, get_robot
 from loco_drake.models.shipped import pretrained_path
 from loco_drake.motion.gait_schedule import parse_schedule
 from loco_drake.motion.gaits import parse_label
-from loco_drake.motion.motion import load_motion
+from loco_drake.motion.motion_file import load_motion
 from loco_drake.motion.quality import (
     joint_speed_ratio_max,
     penetration_max,

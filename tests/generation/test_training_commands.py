@@ -6,7 +6,7 @@ from loco_drake.cli.generate import Generate
 from loco_drake.cli.train_generator import TrainGenerator
 from loco_drake.cli.train_tokenizer import TrainTokenizer
 from loco_drake.common.errors import InputError
-from loco_drake.motion.motion import load_motion
+from loco_drake.motion.motion_file import load_motion
 
 
 def test_from_motions_to_new_motions_by_three_commands(motions, tmp_path):

@@ -11,7 +11,7 @@ from loco_drake.generation.training_motions import (
     load_library,
 )
 from loco_drake.motion.gaits import parse_label
-from loco_drake.motion.motion import save_motion
+from loco_drake.motion.motion_file import save_motion
 
 
 def clip(label, recording, frames):

@@ -9,7 +9,7 @@ from loco_drake.generation.training_record import (
     read_training_record,
     seen_in_training,
 )
-from loco_drake.motion.motion import load_motion
+from loco_drake.motion.motion_file import load_motion
 from tests.synthetic_motion import synthetic_motion
 
 # Those for training of the folder `motions`: two stretches of 3 s, 151 frames, each.

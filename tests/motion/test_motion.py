@@ -7,7 +7,8 @@ import pytest
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import quat_rotate
 from loco_drake.models.robots import get_robot
-from loco_drake.motion.motion import UNITS, load_motion, make_motion, save_motion
+from loco_drake.motion.motion import UNITS, make_motion
+from loco_drake.motion.motion_file import load_motion, save_motion
 from tests.synthetic_motion import synthetic_motion
 
 

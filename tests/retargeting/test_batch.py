@@ -3,7 +3,7 @@ from dataclasses import replace
 from loco_drake.datasets.segments import read_segments
 from loco_drake.datasets.split import Split
 from loco_drake.models.robots import get_robot
-from loco_drake.motion.motion import load_motion
+from loco_drake.motion.motion_file import load_motion
 from loco_drake.retargeting.batch import retarget_segments
 
 

@@ -9,7 +9,7 @@ import pytest
 from loco_drake.common.errors import InputError
 from loco_drake.datasets.split import TRAIN, VALIDATION
 from loco_drake.motion.gaits import GaitLabel
-from loco_drake.motion.motion import load_motion, save_motion
+from loco_drake.motion.motion_file import load_motion, save_motion
 from loco_drake.retargeting.trajectories import (
     Stretch,
     choose_windows,

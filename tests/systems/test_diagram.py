@@ -10,7 +10,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.control.actor import Actor, ActorConfig, load_actor, save_actor
 from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import policy_path, policy_variants, pretrained_dir
-from loco_drake.motion.motion import save_motion
+from loco_drake.motion.motion_file import save_motion
 from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
 from loco_drake.systems.scenario import (
     ExternalAction,

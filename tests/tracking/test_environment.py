@@ -11,7 +11,7 @@ from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.reward import REWARD_TERMS
 from loco_drake.models.plant import ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import get_robot
-from loco_drake.motion.motion import save_motion
+from loco_drake.motion.motion_file import save_motion
 from loco_drake.systems.diagram import MakeLocomotionDiagram, PlaceOnPlan
 from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
 from loco_drake.tracking.batch import TrackingBatch

@@ -11,7 +11,7 @@ import pytest
 
 from loco_drake.control.actor import load_actor
 from loco_drake.models.robots import get_robot
-from loco_drake.motion.motion import save_motion
+from loco_drake.motion.motion_file import save_motion
 from loco_drake.tracking.checkpoint import load_checkpoint
 from tests.synthetic_motion import synthetic_motion
 

@@ -1,0 +1,251 @@
+"""Whether a motion keeps to the conventions of Motion: measured, not trusted.
+
+A wrong unit, order or frame contradicts the rest of the data: velocities are those of
+the positions, feet stand on the ground and do not move while they do, joints stay
+within the limits of the robot. What contradicts is refused with the reason; nothing is
+guessed. Motions that this project writes are further from each bound than a factor of
+ten, but for joint speeds, which reach a fifth.
+"""
+
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.common.errors import InputError, quoted
+from loco_drake.common.rotations import (
+    angular_velocity,
+    quat_conjugate,
+    quat_continuous,
+    quat_rotate,
+)
+from loco_drake.models.legs import LEGS, MIRROR_JOINT_SIGNS
+from loco_drake.models.robots import ROBOTS, Robot, get_robot
+from loco_drake.motion.motion import Motion
+from loco_drake.motion.quality import toe_trajectories
+
+Array = NDArray[np.float64]
+
+MIN_FRAMES = 3  # of which velocities can be told
+MAX_DISTANCE = 1e4  # m from the world's origin
+MAX_BASE_SPEED = 10.0  # m/s
+MAX_TURNING = 30.0  # rad/s
+MAX_JOINT_SPEED = 5.0  # times the joint's limit; what is too fast will be slowed down
+JOINT_MARGIN = 0.2  # rad beyond the limits
+GROUND_MARGIN = 0.1  # stand heights from the lowest sole to the ground
+STANCE_SPEED = 0.05  # m/s of standing toes, from which on other readings are tried
+
+
+def in_robot_order(motion: Motion) -> Motion:
+    """Returns the motion with its joints in the order of its robot.
+
+    Motions of robots that are not in :data:`ROBOTS` are left as they are.
+
+    Raises:
+        InputError: if its joints are not those of the robot.
+    """
+    if motion.robot not in ROBOTS:
+        return motion
+    names = get_robot(motion.robot).joint_names
+    if motion.joint_names == names:
+        return motion
+    if sorted(motion.joint_names) != sorted(names):
+        foreign = [name for name in motion.joint_names if name not in names]
+        raise InputError(
+            f"The joints of {motion.robot} are {', '.join(names)}, each once"
+            + (f", not {quoted(foreign[0])}." if foreign else ".")
+        )
+    order = [motion.joint_names.index(name) for name in names]
+    legs = dict.fromkeys(name.split("_")[0] for name in motion.joint_names)
+    return replace(
+        motion,
+        joint_names=names,
+        joint_positions=motion.joint_positions[:, order],
+        joint_velocities=motion.joint_velocities[:, order],
+        provenance={
+            **motion.provenance,
+            "joints": f"reordered from {', '.join(legs)} to {', '.join(LEGS)}",
+        },
+    )
+
+
+def check_conventions(motion: Motion) -> None:
+    """Raises InputError, with the reason, where the data contradict each other.
+
+    Feet, limits and joint speeds are checked of robots in :data:`ROBOTS`.
+    """
+    if len(motion) < MIN_FRAMES:
+        raise InputError(f"It needs at least {MIN_FRAMES} frames, not {len(motion)}.")
+    if not 1 <= motion.fps <= 1000:
+        raise InputError(f"Its rate must be 1 to 1000 frames/s, not {motion.fps:g}.")
+    if (far := np.abs(motion.base_position).max()) > MAX_DISTANCE:
+        raise InputError(f"Its base is {far:.3g} m from the origin; are these metres?")
+    robot = get_robot(motion.robot) if motion.robot in ROBOTS else None
+    if robot is not None:
+        _check_joints(motion, robot)
+    _check_speeds(motion, robot)
+    _check_velocities(motion)
+    if robot is not None:
+        _check_feet(motion, robot)
+
+
+def _check_joints(motion: Motion, robot: Robot) -> None:
+    def beyond(joints: Array) -> Array:
+        return np.maximum(robot.joint_lower - joints, joints - robot.joint_upper)
+
+    excess = beyond(motion.joint_positions)
+    frame, joint = np.unravel_index(excess.argmax(), excess.shape)
+    if excess[frame, joint] > JOINT_MARGIN:
+        degrees = beyond(np.radians(motion.joint_positions)).max() <= JOINT_MARGIN
+        raise InputError(
+            f"{robot.joint_names[joint]} is at "
+            f"{motion.joint_positions[frame, joint]:.4g} rad, but its limits are "
+            f"{robot.joint_lower[joint]:.3g} and {robot.joint_upper[joint]:.3g}"
+            + ("; the joints seem to be in degrees." if degrees else ".")
+        )
+
+
+def _check_speeds(motion: Motion, robot: Robot | None) -> None:
+    """Checks velocities, and steps from frame to frame."""
+    steps = np.diff(motion.base_position, axis=0) * motion.fps
+    turning = angular_velocity(quat_continuous(motion.base_quaternion), 1 / motion.fps)
+    joints = np.diff(motion.joint_positions, axis=0) * motion.fps
+    limits = np.full(joints.shape[1], 200.0)  # rad/s, of a robot that is not known
+    if robot is not None:
+        limits = MAX_JOINT_SPEED * robot.joint_speed_limits
+    for what, unit, values, most in (
+        ("base", "m/s", (steps, motion.base_velocity), MAX_BASE_SPEED),
+        ("base", "rad/s", (turning, motion.base_angular_velocity), MAX_TURNING),
+        ("fastest joint", "rad/s", (joints, motion.joint_velocities), limits),
+    ):
+        both = np.abs(np.concatenate(values))
+        if (both > most).any():
+            raise InputError(
+                f"Its {what} moves at {both.max():.3g} {unit} where {np.max(most):.3g} "
+                f"is the most that is plausible; are units and rate right?"
+            )
+
+
+def _check_velocities(motion: Motion) -> None:
+    """Compares velocities with central differences, but for the first and last frame.
+
+    Any estimate of a velocity lies within the speeds nearby, so no deviation may be as
+    large as the highest speed, nor half as large in root mean square.
+    """
+    quaternion = quat_continuous(motion.base_quaternion)
+    to_trunk = quat_conjugate(quaternion)[1:-1]
+    turning = angular_velocity(quaternion, 1 / motion.fps)[1:-1]
+    for name, rounding, true in (
+        ("base_velocity", 0.1, _differences(motion.base_position, motion.fps)),
+        ("joint_velocities", 0.5, _differences(motion.joint_positions, motion.fps)),
+        ("base_angular_velocity", 0.3, turning),
+    ):
+        given = getattr(motion, name)[1:-1]
+        if _agree(given, true, rounding):
+            continue
+        other = {
+            "they are all zero": np.zeros_like(true),
+            "they agree in degrees per second": np.degrees(true),
+        }
+        if name != "joint_velocities":
+            other["they agree in the trunk's frame"] = quat_rotate(to_trunk, true)
+        factor = np.sqrt((given**2).sum() / max((true**2).sum(), 1e-12))
+        other[f"they agree at {factor * motion.fps:.3g} frames/s"] = factor * true
+        xyzw = quat_continuous(motion.base_quaternion[:, [3, 0, 1, 2]])
+        if name == "base_angular_velocity":
+            other["they agree with quaternions x, y, z, w"] = angular_velocity(
+                xyzw, 1 / motion.fps
+            )[1:-1]
+        reasons = [k for k, v in other.items() if _agree(given, v, 0.01 * rounding)]
+        raise InputError(
+            f"Its {name} are not those of its positions, in {motion.fps:g} frames/s, "
+            f"the world's frame and SI units"
+            + "".join(f"; {r}" for r in reasons[:1])
+            + "."
+        )
+
+
+def _differences(values: Array, fps: float) -> Array:
+    return (values[2:] - values[:-2]) * (fps / 2)
+
+
+def _agree(given: Array, true: Array, rounding: float) -> bool:
+    off = np.abs(given - true)
+    rms = float(np.sqrt((off**2).mean()))
+    return bool(
+        off.max() <= np.abs(true).max() + rounding
+        and rms <= 0.5 * np.sqrt((true**2).mean()) + rounding
+    )
+
+
+def _check_feet(motion: Motion, robot: Robot) -> None:
+    x, y = motion.base_quaternion[:, 1], motion.base_quaternion[:, 2]
+    if (up := np.median(1 - 2 * (x * x + y * y))) < 0.5:
+        raise InputError(
+            f"Its trunk's z axis is {np.degrees(np.arccos(up)):.0f} degrees from the "
+            "world's: quaternions must be w, x, y, z, and z up."
+        )
+    slip = stance_speed(motion, robot)
+    if slip > STANCE_SPEED:
+        for what, other in _other_readings(motion).items():
+            if stance_speed(other, robot) < slip / 4:
+                raise InputError(
+                    f"Its standing feet move at {slip:.2g} m/s, but would not {what}."
+                )
+    soles = toe_trajectories(motion, robot)[..., 2] - robot.foot_radius
+    lowest, margin = soles.min(), GROUND_MARGIN * robot.stand_height
+    # Less than half a second may be flight.
+    if not -margin < lowest < margin + (motion.duration < 0.5) * robot.stand_height:
+        raise InputError(
+            f"Its lowest foot is {abs(lowest):.3f} m "
+            f"{'above' if lowest > 0 else 'below'} the ground, which is at z = 0."
+        )
+    base = np.linalg.norm(motion.base_velocity, axis=1).mean()
+    if slip > 0.3 + 0.5 * base:
+        raise InputError(
+            f"Its feet move at {slip:.2g} m/s while contacts say that they stand, "
+            f"and its base at {base:.2g} m/s."
+        )
+    down = motion.contacts
+    if (
+        down.any()
+        and not down.all()
+        and soles[down].mean() > soles[~down].mean() + 0.01
+    ):
+        raise InputError(
+            f"Its feet are {soles[down].mean():.3f} m above the ground where contacts "
+            f"say that they stand, {soles[~down].mean():.3f} m where they do not."
+        )
+
+
+def stance_speed(motion: Motion, robot: Robot) -> float:
+    """Returns the median speed in m/s of toes that contacts say stand; 0 if none do."""
+    p_WF = toe_trajectories(motion, robot)
+    speeds = np.linalg.norm(np.diff(p_WF, axis=0), axis=-1) * motion.fps
+    standing = speeds[motion.contacts[1:] & motion.contacts[:-1]]
+    return float(np.median(standing)) if len(standing) else 0.0
+
+
+def _other_readings(motion: Motion) -> dict[str, Motion]:
+    """Returns the motion as it would be if a convention were another."""
+    q = motion.base_quaternion
+    readings = {
+        "with quaternions x, y, z, w": replace(
+            motion, base_quaternion=q[:, [3, 0, 1, 2]]
+        ),
+        "with inverse quaternions": replace(motion, base_quaternion=quat_conjugate(q)),
+    }
+    turned = motion.joint_positions * MIRROR_JOINT_SIGNS
+    readings["with hips of the other sign"] = replace(motion, joint_positions=turned)
+    per_leg = motion.joint_positions.reshape(len(motion), 4, -1)
+    for order in list(permutations(range(4)))[1:]:
+        # Leg k of the robot is at order[k] in the file.
+        names = ", ".join(LEGS[order.index(k)] for k in range(4))
+        joints = per_leg[:, order].reshape(len(motion), -1)
+        swapped = replace(motion, joint_positions=joints)
+        readings[f"with legs in the order {names}"] = swapped
+        readings[f"with legs and contacts in the order {names}"] = replace(
+            swapped, contacts=motion.contacts[:, order]
+        )
+    return readings
