@@ -61,7 +61,11 @@ def load_motion(path: Path) -> Motion:
         if not path.is_file():
             raise InputError(f"There is no Motion file {str(path)!r}.")
         header, arrays = _read(path)
-        motion = in_robot_order(_make(header, arrays))
+        claimed = header.pop("content_sha256", None)
+        motion = _make(header, arrays)
+        if claimed not in (None, _content_sha256(header, arrays)):
+            raise InputError("It is damaged: it was written with other content.")
+        motion = in_robot_order(motion)
         check_conventions(motion)
     except InputError as error:
         named = str(path) in str(error)
@@ -91,9 +95,6 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
             raise InputError(f"Its arrays are larger than {MAX_BYTES >> 20} MB.")
         header = parse_json(_array(archive, members["header.npy"]).item())
         arrays = {name: _array(archive, members[f"{name}.npy"]) for name in UNITS}
-    claimed = header.pop("content_sha256", None)
-    if claimed not in (None, _content_sha256(header, arrays)):
-        raise InputError("It is damaged: its content has another hash than it says.")
     return header, arrays
 
 

@@ -19,6 +19,7 @@ from loco_drake.control.plan import (
 )
 from loco_drake.models.legs import LEGS
 from loco_drake.models.robots import AddRobotModel
+from loco_drake.motion.gaits import GaitLabel
 from tests.synthetic_motion import synthetic_motion
 
 
@@ -95,8 +96,8 @@ def test_a_plan_that_was_pickled_is_as_immutable(trot):
         ("p_WF", lambda a: a[:, :3], "p_WF"),
         ("contacts", lambda a: a.astype(float), "contacts must be of type bool"),
         ("labels", lambda a: a + 0.7, "labels must be of type int64"),
-        ("labels", lambda a: a + 15, "indices from 0 to 14"),
-        ("labels", lambda a: a - 5, "indices from 0 to 14"),
+        ("labels", lambda a: a + 45, "indices from 0 to 44"),
+        ("labels", lambda a: a - 5, "indices from 0 to 44"),
         ("path_time", lambda a: a[::-1], "path_time must never decrease"),
         ("q", lambda a: 1.1 * a, "length 1.1"),
         ("v", lambda a: a * np.nan, "must be finite"),
@@ -141,8 +142,18 @@ def test_motion_of_another_rate_or_robot_is_refused(go2):
     names = ("x", *motion.joint_names[1:])
     with pytest.raises(InputError, match=r"joints .* FL_hip_joint, FL_thigh_joint"):
         plan_from_motion(go2, replace(motion, joint_names=names))
-    with pytest.raises(InputError, match=r"dog-waltz.* dog-pace, dog-trot"):
-        plan_from_motion(go2, replace(motion, gait="waltz"))
+
+
+def test_a_plan_has_the_gait_of_each_frame(go2):
+    """Also one that no shipped network knows, and one that changes on the way."""
+    motion = synthetic_motion("dog-trot", 1.0)
+    waltz = GaitLabel("dog", "waltz")
+    plan = plan_from_motion(go2, replace(motion, gait="waltz"))
+    assert set(plan.labels) == {waltz.index}
+    pace = GaitLabel("dog", "pace")
+    several = replace(motion, gait_changes=((0, pace), (20, waltz)))
+    labels = plan_from_motion(go2, several.slice(15, 45)).labels
+    assert labels.tolist() == [pace.index] * 5 + [waltz.index] * 25
 
 
 def test_the_standing_plan_has_its_soles_on_the_ground(go2):
