@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError, quoted
 from loco_drake.common.files import atomic_path, content_sha256, parse_json
-from loco_drake.motion.conventions import check_conventions, in_robot_order
 from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.motion import UNITS, Motion
 
@@ -56,6 +55,9 @@ def load_motion(path: Path) -> Motion:
         InputError: if the file is missing, damaged, of a newer schema, or fails a
             check of :class:`Motion` or :func:`.conventions.check_conventions`.
     """
+    # It loads Drake, which --help and what only writes need not wait for.
+    from loco_drake.motion.conventions import check_conventions, in_robot_order
+
     path = Path(path)
     try:
         if not path.is_file():
