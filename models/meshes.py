@@ -5,8 +5,10 @@ Drake reads no Collada. The Go2's and A1's meshes of the PyPI package
 beside it, in the user's cache. They are for drawing only.
 """
 
+import warnings
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 from pydrake.multibody.parsing import PackageMap
@@ -18,6 +20,8 @@ from loco_drake.common.files import atomic_path, cache_dir
 _VERSION = 1
 
 _FOLDERS = {"go2": "go2_description/visuals", "a1": "a1_description/meshes"}
+
+_LOADING = Lock()  # warnings' filters belong to the whole process
 
 # Vertices closer than this are merged, in m. It leaves the Go2's meshes nearly as they
 # are and shrinks the A1's to two fifths, so that a static replay stays small.
@@ -91,7 +95,10 @@ def _convert(source: Path, target: Path, grain: float) -> None:
     # Importing it takes longer than all the rest; only the first conversion needs it.
     import trimesh
 
-    scene = trimesh.load_scene(source)
+    # Pycollada sets the shape of arrays, which numpy 2.5 deprecates (pycollada#162).
+    with _LOADING, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Setting the shape", DeprecationWarning)
+        scene = trimesh.load_scene(source)
     obj = [f"mtllib {target.stem}.mtl"]
     mtl = []
     count = 0
