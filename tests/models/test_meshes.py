@@ -22,6 +22,7 @@ def vendor_meshes(robot):
     return sorted(root.glob("*.dae"))
 
 
+@pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")  # pycollada
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_converted_meshes_lie_where_the_vendors_do(robot, mesh_cache):
     """Same bounds within the grain, 2 mm: nothing turned, scaled or lost."""
