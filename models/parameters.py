@@ -1,10 +1,26 @@
-"""Physical parameters of a robot, set in a Context of its plant."""
+"""Physical parameters of a robot, set in a Context of its plant, and their bounds."""
+
+from functools import lru_cache
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import Context
+from scipy.optimize import minimize
+
+from loco_drake.common.errors import InputError
+
+from .plant import PlantConfig
+from .robots import Robot, get_robot
+
+Array = NDArray[np.float64]
+
+LEAST_PAYLOAD = -3.0  # kg; what bounds hold for
+
+_POSES, _REFINED = 1000, 4
 
 
 def SetTrunkLoad(
@@ -12,7 +28,7 @@ def SetTrunkLoad(
     context: Context,
     *,
     mass: float,
-    p_shift_B: NDArray[np.float64],
+    p_shift_B: Array,
 ) -> None:
     """Makes the trunk heavier and moves its centre of mass, both against the model.
 
@@ -41,16 +57,90 @@ def SetTrunkLoad(
 
 
 def SetReflectedInertia(
-    plant: MultibodyPlant, context: Context, inertia: NDArray[np.float64]
+    plant: MultibodyPlant, context: Context, inertia: Array
 ) -> None:
     """Sets the inertia of the rotors as seen at the joints.
 
     Args:
         plant: with a robot of :func:`.robots.AddRobotModel`.
         context: the plant's.
-        inertia: by actuator, kg m^2, shape (12,).
+        inertia: by actuator, kg m^2, shape (12,); may be below 0, where links make up
+            for it.
+
+    Raises:
+        InputError: if the mass matrix would not be positive definite in every pose.
     """
-    for index, value in zip(plant.GetJointActuatorIndices(), inertia, strict=True):
+    indices = plant.GetJointActuatorIndices()
+    instance = plant.get_joint_actuator(indices[0]).model_instance()
+    robot = get_robot(plant.GetModelInstanceName(instance))
+    least = robot.reflected_inertia - removable_inertia(robot)
+    if not (np.isfinite(inertia) & (inertia >= least)).all():
+        raise InputError(
+            f"With a reflected inertia of {np.min(inertia):.3g} kg m^2 the mass matrix "
+            f"of {robot.name} is not positive definite in every pose; the least are "
+            f"{', '.join(f'{value:.4f}' for value in least[:3])} in a leg."
+        )
+    for index, value in zip(indices, inertia, strict=True):
         actuator = plant.get_joint_actuator(index)
         ratio = actuator.default_gear_ratio()
         actuator.SetRotorInertia(context, value / ratio**2)
+
+
+@lru_cache
+def removable_inertia(robot: Robot) -> float:
+    """Returns how much inertia may be taken off all joints at once, kg m^2.
+
+    The mass matrix M stays positive definite in every pose within the joints' limits:
+    M - c S S', where S picks the joints' columns, is so while c is below the smallest
+    eigenvalue of (S' M^-1 S)^-1. The least of these is searched for from many poses,
+    the trunk lightened by :data:`LEAST_PAYLOAD`, and rounded down to 1e-4.
+    """
+    plant = MultibodyPlant(time_step=0.0)
+    robot.AddModel(Parser(plant))
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    SetTrunkLoad(plant, context, mass=LEAST_PAYLOAD, p_shift_B=np.zeros(3))
+
+    def least(joints: Array) -> float:
+        plant.SetPositions(context, [1.0, *[0.0] * 6, *joints])
+        M = plant.CalcMassMatrix(context)
+        return float(1 / np.linalg.eigvalsh(np.linalg.inv(M)[6:, 6:])[-1])
+
+    low, high = robot.joint_lower, robot.joint_upper
+    poses = np.random.default_rng(0).uniform(low, high, (_POSES, len(low)))
+    bounds = list(zip(low, high, strict=True))
+    worst = sorted(poses, key=least)[:_REFINED]
+    found = [minimize(least, q, bounds=bounds, method="L-BFGS-B").fun for q in worst]
+    return int(1e4 * min(found)) / 1e4
+
+
+def surplus_inertia(robot: Robot, plant: PlantConfig) -> Array:
+    """Returns the inertia that the implicit PD of a motor at no strength has, (12,).
+
+    In kg m^2; see :class:`loco_drake.systems.actuation.Actuation`.
+    """
+    h = 0.0 if plant.contact == "cenic" else plant.time_step
+    return (robot.kd + robot.kp * h) * h
+
+
+def least_strength(robot: Robot, plant: PlantConfig) -> float:
+    """Returns the least strength that motors may have, over that of their model.
+
+    A motor of strength s has (1 - s) times :func:`surplus_inertia` less inertia, and
+    of that no more than :func:`removable_inertia` may go. Rounded up to 1 %.
+    """
+    surplus = float(surplus_inertia(robot, plant).max())
+    if surplus == 0:
+        return 0.0
+    return max(0.0, ceil(100 * (1 - removable_inertia(robot) / surplus)) / 100)
+
+
+def check_strength(robot: Robot, plant: PlantConfig, strength: float) -> None:
+    """Raises InputError if the motors are too weak; see :func:`least_strength`."""
+    least = least_strength(robot, plant)
+    if not least <= strength < np.inf:
+        raise InputError(
+            f"The motor strength of {robot.name} must be at least {least:g} at a time "
+            f"step of {plant.time_step:g} s, not {strength:g}: below, the mass matrix "
+            "would not be positive definite in every pose."
+        )

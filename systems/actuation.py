@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus
 
 from loco_drake.control.domain import Domain
+from loco_drake.models.parameters import check_strength, surplus_inertia
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import Robot
 
@@ -63,8 +64,8 @@ class Actuation(DomainSystem):
         self._continuous = plant.contact == "cenic"
         h = 0.0 if self._continuous else plant.time_step
         self._prediction = h + robot.kd / robot.kp
-        self._rotors = robot.reflected_inertia
-        self._surplus = (robot.kd + robot.kp * h) * h
+        self._robot, self._plant = robot, plant
+        self._surplus = surplus_inertia(robot, plant)
         self._desired = self.DeclareVectorInputPort("desired_state", 2 * size)
         self._state = self.DeclareVectorInputPort("state", 13 + 2 * size)
         # The set-points of the latest steps, the last one first; NaN before the first.
@@ -86,8 +87,14 @@ class Actuation(DomainSystem):
         )
 
     def reflected_inertia(self, strength: Array) -> Array:
-        """Returns the rotors' inertia at joints for this strength, kg m^2, (12,)."""
-        return self._rotors - (1 - strength) * self._surplus
+        """Returns the rotors' inertia at joints for this strength, kg m^2, (12,).
+
+        Raises:
+            InputError: if a motor is weaker than
+                :func:`loco_drake.models.parameters.least_strength`.
+        """
+        check_strength(self._robot, self._plant, float(np.min(strength)))
+        return self._robot.reflected_inertia - (1 - strength) * self._surplus
 
     def _remember(self, context: Context, values: DiscreteValues) -> EventStatus:
         if self._domain(context).latency == 0:

@@ -102,7 +102,7 @@ class TrainTracker:
         randomization = self.randomization
         if self.randomize:
             randomization = randomization.with_standard()
-        randomization.check()
+        randomization.check(robot, self.plant)
         environment = EnvironmentConfig(
             robot=self.robot,
             plant=self.plant,

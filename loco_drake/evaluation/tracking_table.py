@@ -173,7 +173,7 @@ def run_trials(
         randomization: what each trial's world is drawn from, by its label and seed.
     """
     randomization = randomization or RandomizationConfig()
-    randomization.check()
+    randomization.check(get_robot(scenario.robot), scenario.plant)
     scenario = replace(scenario, disturbances=randomization.disturbances)
     recorded = isinstance(scenario.reference, PlanReference)
     if any((trial.segment is not None) != recorded for trial in trials):

@@ -44,7 +44,7 @@ class TrackingBatch:
         self._plans = plans
         self._config = config
         self._robot = get_robot(config.robot)
-        config.randomization.check()
+        config.randomization.check(self._robot, config.plant)
         self._worlds = make_worlds(config, count)
         self._domains = [Domain()] * count
         self._lengths = np.array([len(plan) for plan in plans])

@@ -9,6 +9,8 @@ from loco_drake.common.errors import InputError
 from loco_drake.control.domain import Domain, Push, SensorErrors
 from loco_drake.control.measurement import error_vector
 from loco_drake.control.plan import PLAN_DT
+from loco_drake.models.parameters import LEAST_PAYLOAD, check_strength
+from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import Robot
 from loco_drake.systems.actuation import MAX_LATENCY
 from loco_drake.systems.scenario import Disturbances
@@ -68,12 +70,19 @@ class RandomizationConfig:
     """Errors of the sensors, as a multiple of WHITE and BIAS, the standard deviations
     in loco_drake.tracking.randomization."""
 
-    def check(self) -> None:
-        """Raises InputError unless every range can be drawn from."""
+    def check(
+        self, robot: Robot | None = None, plant: PlantConfig | None = None
+    ) -> None:
+        """Raises InputError unless every range can be drawn from.
+
+        Args:
+            robot: whose motors must be able to be that weak; None does not ask.
+            plant: in which; by default the usual one.
+        """
         for name, least, most in (
             ("friction", 1e-3, np.inf),
             ("stiffness", 1.0, np.inf),
-            ("payload", -3.0, np.inf),
+            ("payload", LEAST_PAYLOAD, np.inf),
             ("com_shift", -0.2, 0.2),
             ("motor_strength", 0.5, 1.5),
             ("latency", 0.0, MAX_LATENCY),
@@ -90,6 +99,8 @@ class RandomizationConfig:
                     f"The randomization's {name} must be two numbers, the smaller one "
                     f"first, of at least {least:g}{limit}, not {low:g} and {high:g}."
                 )
+        if robot is not None and self.motor_strength is not None:
+            check_strength(robot, plant or PlantConfig(), self.motor_strength[0])
         if self.noise is not None and not (0 <= self.noise < np.inf):
             raise InputError(
                 f"The randomization's noise must be 0 or more, not {self.noise:g}."

@@ -17,6 +17,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.control.actor import ActorConfig, save_actor
 from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
 from loco_drake.control.plan import Plan
+from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.tracking.checkpoint import (
     load_checkpoint,
@@ -113,7 +114,8 @@ def train_tracker(
         "hidden": config.ppo.hidden,
         "privileged": config.ppo.privileged,
     }
-    config.environment.randomization.check()
+    world = config.environment
+    world.randomization.check(get_robot(world.robot), world.plant)
     if resume and first is not None:
         raise InputError("Give either a checkpoint to start from or resume, not both.")
     tensors, saved = None, None
