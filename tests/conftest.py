@@ -11,12 +11,20 @@ from tests.synthetic import write_data_folder
 from tests.synthetic_motion import synthetic_motion
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Marks tests that need real recordings: ``-m recordings`` chooses them."""
+    for item in items:
+        if "real_data" in getattr(item, "fixturenames", ()):
+            item.add_marker("recordings")
+
+
 @pytest.fixture(scope="session")
 def real_data() -> Path:
     """The folder of the real recordings; without one the test is skipped."""
     folder = os.environ.get("LOCO_DRAKE_DATA")
-    if not folder or not Path(folder).is_dir():
+    if not folder:
         pytest.skip("needs real recordings: LOCO_DRAKE_DATA names no folder")
+    assert Path(folder).is_dir(), f"LOCO_DRAKE_DATA: there is no folder {folder!r}"
     return Path(folder)
 
 

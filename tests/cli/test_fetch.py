@@ -16,7 +16,7 @@ from loco_drake.cli.main import main
 from loco_drake.datasets import manifest, segment_table
 from loco_drake.datasets.registry import DATASETS
 from tests.mirror_server import serve
-from tests.process import HEAR_CTRL_C
+from tests.process import HEAR_CTRL_C, LIMIT
 from tests.synthetic import write_data_folder
 
 GAITS = ("pace", "trot", "gallop")
@@ -167,9 +167,9 @@ def test_ctrl_c_leaves_whole_files_only(mirror, tmp_path):
             stderr=subprocess.PIPE,
             text=True,
         ) as process:
-            assert server.halfway.wait(60)
+            assert server.halfway.wait(LIMIT)
             process.send_signal(signal.SIGINT)
-            _, error = process.communicate(timeout=60)
+            _, error = process.communicate(timeout=LIMIT)
     assert process.returncode == 1
     assert error.splitlines()[-1] == "loco-drake: interrupted"
     assert "Traceback" not in error

@@ -8,7 +8,7 @@ import pytest
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.parallel import map_in_workers
-from tests.process import HEAR_CTRL_C
+from tests.process import HEAR_CTRL_C, LIMIT
 
 _MADE = []
 
@@ -81,6 +81,6 @@ def test_ctrl_c_ends_the_workers(tmp_path):
     assert process.stdout.readline() == "one\n"
     os.killpg(process.pid, signal.SIGINT)
     # The pipes close when the last process that holds them has ended.
-    _, errors = process.communicate(timeout=20)
+    _, errors = process.communicate(timeout=LIMIT)
     assert errors.count("Traceback") == 1
     assert "KeyboardInterrupt" in errors

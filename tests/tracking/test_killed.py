@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -13,6 +14,7 @@ from loco_drake.control.actor import load_actor
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import save_motion
 from loco_drake.tracking.checkpoint import load_checkpoint
+from tests.process import LIMIT, processes
 from tests.synthetic_motion import synthetic_motion
 
 COMMAND = "from loco_drake.cli.main import main; raise SystemExit(main())"
@@ -26,21 +28,36 @@ def references(tmp_path_factory):
     return folder
 
 
-def train(references, out, *arguments):
-    """Starts a training of two environments a worker."""
-    options = {"references": references, "out": out, "per-worker": 2, "batch": BATCH}
-    line = [f"--{name}={value}" for name, value in options.items()]
-    return subprocess.Popen(
-        [sys.executable, "-c", COMMAND, "train", "tracker", *line, *arguments],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+@pytest.fixture
+def train(references):
+    """Starts a training of two environments a worker; all of it ends with the test."""
+    started = []
+
+    def start(out, *arguments):
+        options = {"references": references, "out": out, "batch": BATCH}
+        line = [f"--{name}={value}" for name, value in options.items()]
+        line += ["--per-worker=2", *arguments]
+        process = subprocess.Popen(
+            [sys.executable, "-c", COMMAND, "train", "tracker", *line],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        with suppress(ProcessLookupError):  # the whole of it has ended
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        process.stderr.close()
 
 
 def wait_for_batches(process, out, count):
     """Waits until so many batches were learned from; the last may not be saved yet."""
-    log, deadline = out / "progress.jsonl", time.monotonic() + 200
+    log, deadline = out / "progress.jsonl", time.monotonic() + LIMIT
     while not log.exists() or len(log.read_text().splitlines()) < count:
         assert process.poll() is None, process.stderr.read()
         assert time.monotonic() < deadline
@@ -49,24 +66,11 @@ def wait_for_batches(process, out, count):
 
 def workers_of(process):
     """Process ids of the workers of a training."""
-    found = subprocess.run(
-        ["pgrep", "-P", str(process.pid), "-f", "spawn_main"],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return [int(pid) for pid in found.stdout.split()]
-
-
-def runs(pid):
-    """Whether there is such a process, other than as a zombie."""
-    state = subprocess.run(
-        ["ps", "-o", "stat=", "-p", str(pid)],
-        capture_output=True,
-        text=True,
-        check=False,
-    ).stdout.strip()
-    return state != "" and not state.startswith("Z")
+    return [
+        pid
+        for pid, found in processes().items()
+        if found.parent == process.pid and "spawn_main" in found.command
+    ]
 
 
 def check_whole(out):
@@ -76,16 +80,16 @@ def check_whole(out):
     return header["state"]["steps"]
 
 
-def test_a_killed_training_goes_on_from_its_last_checkpoint(references, tmp_path):
+def test_a_killed_training_goes_on_from_its_last_checkpoint(train, tmp_path):
     out, figures = tmp_path / "run", tmp_path / "figures.json"
-    first = train(references, out, "--workers=1", "--steps=1000000")
+    first = train(out, "--workers=1", "--steps=50000")
     wait_for_batches(first, out, 3)
     workers = workers_of(first)
     first.send_signal(signal.SIGKILL)
-    first.communicate(timeout=30)
+    first.communicate(timeout=LIMIT)
     assert len(workers) == 1
-    deadline = time.monotonic() + 30
-    while any(runs(pid) for pid in workers):  # they notice that the trainer is gone
+    deadline = time.monotonic() + LIMIT
+    while processes().keys() & set(workers):  # they notice that the trainer is gone
         assert time.monotonic() < deadline
         time.sleep(0.05)
 
@@ -95,8 +99,8 @@ def test_a_killed_training_goes_on_from_its_last_checkpoint(references, tmp_path
     # What a training that is killed while it saves leaves behind.
     (out / ".checkpoint.x1y2.safetensors").write_bytes(b"half")
     resume = ("--workers=1", "--resume", f"--steps={steps + 2 * BATCH}")
-    second = train(references, out, *resume, f"--json={figures}")
-    _, error = second.communicate(timeout=200)
+    second = train(out, *resume, f"--json={figures}")
+    _, error = second.communicate(timeout=LIMIT)
     assert second.returncode == 0, error
     assert check_whole(out) == steps + 2 * BATCH
     assert json.loads(figures.read_text())["steps"] == steps + 2 * BATCH
@@ -107,19 +111,19 @@ def test_a_killed_training_goes_on_from_its_last_checkpoint(references, tmp_path
     assert logged == set(range(BATCH, steps + 2 * BATCH, BATCH))
 
 
-def test_a_killed_worker_ends_training_in_one_sentence(references, tmp_path):
+def test_a_killed_worker_ends_training_in_one_sentence(train, tmp_path):
     out = tmp_path / "run"
-    process = train(references, out, "--workers=2", "--steps=1000000")
+    process = train(out, "--workers=2", "--steps=50000")
     wait_for_batches(process, out, 2)
     workers = workers_of(process)
     assert len(workers) == 2
     os.kill(workers[1], signal.SIGKILL)
-    _, error = process.communicate(timeout=60)
+    _, error = process.communicate(timeout=LIMIT)
     assert process.returncode == 1
     assert error == (
         "loco-drake: A worker process died; training goes on from its checkpoint "
         "with --resume.\n"
     )
-    assert not runs(workers[0])
+    assert workers[0] not in processes()
     assert check_whole(out) >= BATCH
     assert not list(out.glob(".*"))
