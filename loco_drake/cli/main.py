@@ -56,6 +56,8 @@ _COMMANDS = {
     "report": ("report", "Report", "one page of all results, beside the paper's"),
 }
 _HELP = ("-h", "--help")
+# What Drake needs of a bare Debian or Ubuntu.
+_LIBRARIES = "libx11-6 libsm6 libglib2.0-0"
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -82,14 +84,23 @@ def main(arguments: list[str] | None = None) -> int:
         name, rest = _split(arguments, members)
         module, class_name, _ = _COMMANDS[name]
         command = getattr(import_module(f"loco_drake.cli.{module}"), class_name)
-        # Drake reports harmless properties of models below this level, which importing
-        # it sets anew.
-        logging.getLogger("drake").setLevel(logging.ERROR)
+        # A filter, for importing Drake sets the level anew.
+        logging.getLogger("drake").addFilter(_is_error)
         status: int = tyro.cli(command, prog=f"loco-drake {name}", args=rest).run()
         return status
     except InputError as error:
         print(f"loco-drake: {error}", file=sys.stderr)
         return 2
+    except ImportError as error:
+        if "cannot open shared object file" not in str(error):
+            raise
+        library = str(error).split(":")[0]
+        print(
+            f"loco-drake: This system lacks {library}; on Debian or Ubuntu, mend that "
+            f"by: apt-get install {_LIBRARIES}.",
+            file=sys.stderr,
+        )
+        return 1
     except OSError as error:
         # A full disk, a folder that may not be written to: not this program's fault.
         print(f"loco-drake: {error}", file=sys.stderr)
@@ -97,6 +108,11 @@ def main(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("loco-drake: interrupted", file=sys.stderr)
         return 1
+
+
+def _is_error(record: logging.LogRecord) -> bool:
+    """Drake reports harmless properties of models below this level."""
+    return record.levelno >= logging.ERROR
 
 
 def _split(arguments: list[str], members: list[str]) -> tuple[str, list[str]]:
