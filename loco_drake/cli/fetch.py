@@ -19,13 +19,13 @@ from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import InputError, check_choice
 from loco_drake.datasets.download import (
     Outcome,
+    RemoteFile,
     download_files,
-    is_present,
+    files_by_source,
     parse_mirror,
 )
-from loco_drake.datasets.manifest import RemoteFile, files_by_source
 from loco_drake.datasets.registry import DATASETS, data_target
-from loco_drake.datasets.segment_table import add_shipped_rows, read_rows, write_rows
+from loco_drake.datasets.segments import add_shipped_rows, read_rows, write_rows
 
 # Parts of the names of Creative Commons licences, and what they ask.
 _CONDITIONS = {
@@ -73,7 +73,7 @@ class DataFetch:
         table = folder / "segments.csv"
         rows = read_rows(table) if table.exists() else []
         missing = {
-            source: [file for file in listed if not is_present(file, folder)]
+            source: [file for file in listed if not file.is_present(folder)]
             for source, listed in files.items()
         }
         _print_sources(files, missing)

@@ -144,11 +144,7 @@ class Retarget:
             raise InputError("--start, --end and --fps need a FILE.")
         segments = one_format(read_segments(data_dir(self.data_dir)))
         split = Split(segments, self.seed)
-        found = select_segments(segments, self.source, self.gait)
-        if not self.gait:
-            known = [str(label) for label in LABELS]
-            found = [segment for segment in found if segment.label in known]
-        return found, split
+        return select_segments(segments, self.source, self.gait), split
 
     def _segment_of_file(self, file: Path) -> "Segment":
         from loco_drake.datasets.registry import read_clip

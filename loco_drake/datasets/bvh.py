@@ -1,5 +1,6 @@
 """The BVH form of motion capture: a skeleton, and its joint angles frame by frame."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,7 +9,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from loco_drake.common.errors import InputError
-from loco_drake.datasets.text import parse_numbers, read_lines
+from loco_drake.datasets.text import (
+    LARGEST,
+    parse_numbers,
+    read_lines,
+    refuse_decimal_commas,
+)
 
 Array = NDArray[np.float64]
 
@@ -78,6 +84,32 @@ class Bvh:
                 turned.append(parent * local)
         return p
 
+    def find(self, chain: tuple[str, ...]) -> int:
+        """Returns the last joint of a chain of names, other joints may lie between.
+
+        A name in the file may be in another case, and have a namespace before it:
+        ``dog:hips``. An end site is also found behind further joints.
+
+        Raises:
+            LookupError: with the first name of the chain that is not found.
+        """
+        found = -1
+        for name in chain:
+            below = (
+                index
+                for index, joint in enumerate(self.joints)
+                if _plain(joint.name) == _plain(name) and self._is_below(index, found)
+            )
+            found = next(below, -1)
+            if found < 0:
+                raise LookupError(name)
+        return found
+
+    def _is_below(self, index: int, ancestor: int) -> bool:
+        while index >= 0 and index != ancestor:
+            index = self.joints[index].parent
+        return index == ancestor
+
 
 def read_bvh(path: Path, what: str) -> Bvh:
     """Returns a BVH file.
@@ -88,19 +120,21 @@ def read_bvh(path: Path, what: str) -> Bvh:
 
     Raises:
         InputError: if it is no BVH file, holds fewer or more frames than it says, or
-            something other than finite numbers.
+            something other than finite numbers, or angles in radians.
     """
     lines = read_lines(path, what)
-    heads = [number for number, line in enumerate(lines) if line.strip() == "MOTION"]
-    if lines[0].strip() != "HIERARCHY" or len(heads) != 1 or len(lines) < heads[0] + 4:
+    heads = [k for k, line in enumerate(lines) if line.strip().upper() == "MOTION"]
+    whole = len(heads) == 1 and len(lines) >= heads[0] + 4
+    if lines[0].strip().upper() != "HIERARCHY" or not whole:
         raise InputError(
             f"{path} is not {what}: it lacks HIERARCHY, or MOTION with its frames."
         )
     (head,) = heads
     try:
-        joints = _parse_hierarchy(lines[1:head])
+        joints = _parse_hierarchy("\n".join(lines[1:head]).split())
     except (ValueError, IndexError):
         raise InputError(f"{path} is not {what}: its HIERARCHY is damaged.") from None
+    refuse_decimal_commas(lines[head + 3], path, what)
     frames = _header_value(lines[head + 1], "Frames", path, what)
     step = _header_value(lines[head + 2], "Frame Time", path, what)
     columns = sum(len(joint.channels) for joint in joints)
@@ -121,54 +155,78 @@ def read_bvh(path: Path, what: str) -> Bvh:
     if not finite.all():
         line = int(np.argmin(finite)) + head + 4
         raise InputError(f"{path} is not {what}: line {line} holds NaN or infinity.")
+    _refuse_radians(joints, motion, path, what)
     return Bvh(joints, motion, 1 / step)
+
+
+def _refuse_radians(joints: list[Joint], motion: Array, path: Path, what: str) -> None:
+    """Raises InputError if no joint but the root ever turns by more than 2 pi.
+
+    Legs that walk turn by tens of degrees, so such angles are in radians.
+    """
+    columns = [
+        joint.first + k
+        for joint in joints
+        if joint.parent >= 0
+        for k, channel in enumerate(joint.channels)
+        if channel.endswith("rotation")
+    ]
+    largest = np.abs(motion[:, columns]).max(initial=0.0)
+    if 0.3 < largest <= 2 * np.pi and len(motion) > 1:
+        raise InputError(
+            f"{path} is not {what}: its joints turn by {largest:.3g} at most, which "
+            "looks like radians; BVH has degrees."
+        )
 
 
 def _header_value(line: str, name: str, path: Path, what: str) -> float:
     """Returns the number of a line such as ``Frames: 593``, above 0."""
     label, _, text = line.partition(":")
+    refuse_decimal_commas(f"{text} {text}", path, what)
     try:
         value = float(text)
     except ValueError:
         value = 0.0
-    if label.strip() != name or not 0 < value < float("inf"):
+    if "".join(label.lower().split()) != name.lower().replace(" ", "") or not (
+        0 < value < float("inf")
+    ):
         raise InputError(f"{path} is not {what}: its MOTION lacks {name!r}.")
     return value
 
 
-def _parse_hierarchy(lines: list[str]) -> list[Joint]:
+def _parse_hierarchy(words: list[str]) -> list[Joint]:
     """Returns the joints; raises ValueError or IndexError if the text is damaged."""
     joints: list[Joint] = []
     open_joints: list[int] = []
     columns = 0
-    words = [word for line in lines for word in line.split()]
     k = 0
     while k < len(words):
         if words[k] == "}":
             open_joints.pop()
             k += 1
             continue
-        kind, name = words[k], words[k + 1]
-        if kind not in ("ROOT", "JOINT", "End") or words[k + 2 : k + 4] != [
-            "{",
-            "OFFSET",
-        ]:
+        brace = words.index("{", k)
+        kind, name = words[k].upper(), " ".join(words[k + 1 : brace])
+        root = kind == "ROOT"
+        if kind not in ("ROOT", "JOINT", "END") or words[brace + 1].upper() != "OFFSET":
             raise ValueError(kind)
-        if (kind == "ROOT") != (not open_joints) or (kind == "ROOT" and joints):
+        if root != (not open_joints) or (root and joints) or not name:
             raise ValueError(kind)
-        x, y, z = (float(word) for word in words[k + 4 : k + 7])
+        x, y, z = (float(word) for word in words[brace + 2 : brace + 5])
+        if not all(abs(value) < LARGEST for value in (x, y, z)):
+            raise ValueError(name)
         channels: tuple[str, ...] = ()
-        k += 7
-        if kind != "End":
-            if words[k] != "CHANNELS":
+        k = brace + 5
+        if kind != "END":
+            if words[k].upper() != "CHANNELS":
                 raise ValueError(name)
             count = int(words[k + 1])
-            channels = tuple(words[k + 2 : k + 2 + count])
-            if len(channels) != count or not all(map(_is_channel, channels)):
+            channels = tuple(_channel(word) for word in words[k + 2 : k + 2 + count])
+            if len(channels) != count or len(set(channels)) != count:
                 raise ValueError(name)
             k += 2 + count
         parent = open_joints[-1] if open_joints else -1
-        title = END_SITE if kind == "End" else name
+        title = END_SITE if kind == "END" else name
         joints.append(Joint(title, parent, (x, y, z), channels, columns))
         open_joints.append(len(joints) - 1)
         columns += len(channels)
@@ -177,5 +235,14 @@ def _parse_hierarchy(lines: list[str]) -> list[Joint]:
     return joints
 
 
-def _is_channel(name: str) -> bool:
-    return name[:1] in "XYZ" and name[1:] in ("position", "rotation")
+def _channel(word: str) -> str:
+    """Returns the usual spelling of a channel's name, such as ``Zrotation``."""
+    name = word[:1].upper() + word[1:].lower()
+    if name[:1] not in set("XYZ") or name[1:] not in ("position", "rotation"):
+        raise ValueError(word)
+    return name
+
+
+def _plain(name: str) -> str:
+    """Returns a joint's name without namespace, and without regard to case."""
+    return re.split(r"[:|]", name)[-1].strip().lower()

@@ -12,16 +12,19 @@ from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.runs import intervals
-from loco_drake.datasets.normalize import check_range, start_along_x
-from loco_drake.datasets.simulated import read_points, trunk_ends
-from loco_drake.motion.keypoints import KeypointClip
+from loco_drake.datasets.conventions import orient
+from loco_drake.datasets.recording import Array, Body, Recording, check_told
+from loco_drake.datasets.simulated import read_robot
 
-Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 FORMAT = "an mpc keypoint file"
 # Of the front left hip in the trunk's frame, m.
 HALF_SIZE = (0.1505, 0.044)
+
+BODY = Body(height=(0.08, 0.4), stride=(0.5, 5.0), jump=0.28, markers=False)
+# Ground further off than this, m, is worth a word.
+GROUND = 0.02
 
 RATES = (100.0, 200.0)
 RUN_SECONDS = 5.0
@@ -38,66 +41,41 @@ STILL = 1e-5
 
 
 def read_mpc(
-    path: Path,
-    *,
-    gait: str,
-    start: int | None = None,
-    end: int | None = None,
-    fps: float | None = None,
-) -> KeypointClip:
-    """Reads frames ``start`` to ``end`` (exclusive) of a simulated run.
+    path: Path, start: int | None, end: int | None, fps: float | None
+) -> Recording:
+    """Reads a simulated run; without ``fps`` its swings tell the rate.
 
-    Withers and hip are the middles of the front and rear hips. The median height of
-    all standing feet of the run becomes the ground: a pacing robot stands 12 mm above
-    that of its simulator.
-
-    Args:
-        path: a keypoint text file.
-        gait: what the robot does.
-        start: first frame, from 0; None for the start of the file, at rest.
-        end: frame after the last; None for the end of the file.
-        fps: frames per second; None to infer them from the swings, see
-            :func:`infer_rate`.
+    The median height of all standing feet becomes the ground: a pacing robot stands
+    12 mm above that of its simulator.
 
     Raises:
-        InputError: if the file is not of this format, the stretch not within it, or its
-            rate not to be found.
+        InputError: if the file is not of this format, or its rate not to be found or
+            not that of its swings.
     """
-    path = Path(path)
-    points = read_points(path, FORMAT)
-    feet, centre, hips = points[:, :4], points[:, 4], points[:, 5:]
-    withers, hip = trunk_ends(centre, hips, HALF_SIZE, path, FORMAT)
-    first, stop = check_range(start, end, len(points), path.name)
-    rate = fps or infer_rate(feet, path)
-    ground = np.array([0.0, 0.0, ground_height(feet)])
-    withers, hip, toes = start_along_x(
-        *(p[first:stop] - ground for p in (withers, hip, feet))
-    )
-    return KeypointClip(
-        source="mpc",
-        gait=gait,
-        fps=rate,
-        withers=withers,
-        hip=hip,
-        toes=toes,
-        provenance={"file": path.name, "frames": f"{first}-{stop}"},
-    )
+    points = read_robot(path, FORMAT, HALF_SIZE, centre=4, hips=5, feet=0)
+    notes: dict[str, str] = {}
+    points = orient(points, BODY, path, notes)
+    rate = infer_rate(points[:, 2:], path, fps)
+    ground = stance_height(points[:, 2:])
+    if abs(ground) > GROUND:
+        notes["ground"] = f"moved from z = {ground:.3f} m to 0"
+    return Recording(points - np.array([0.0, 0.0, ground]), rate, notes=notes)
 
 
-def ground_height(feet: Array) -> float:
+def stance_height(feet: Array) -> float:
     """Returns the median height in m of the feet (T, 4, 3) that stand still."""
     still = _still(feet)
     return float(np.median(feet[1:, :, 2][still])) if still.any() else 0.0
 
 
-def infer_rate(feet: Array, path: Path) -> float:
-    """Returns the frames per second of feet (T, 4, 3).
+def infer_rate(feet: Array, path: Path, fps: float | None) -> float:
+    """Returns the frames per second of feet (T, 4, 3), ``fps`` unless it is wrong.
 
     The controller swings every foot for a fixed time, so the frames of a swing tell the
     rate, also of a file that was cut. Without a whole swing the length of the run does.
 
     Raises:
-        InputError: if neither tells.
+        InputError: if neither tells, or the swings contradict ``fps``.
     """
     still = _still(feet)
     swings = _whole_runs(~still)
@@ -113,7 +91,9 @@ def infer_rate(feet: Array, path: Path) -> float:
         }
         best = min(RATES, key=lambda rate: errors[rate])
         if errors[best] <= SWING_TOLERANCE:
-            return best
+            return check_told(best, fps, path, FORMAT)
+    if fps is not None:
+        return fps
     for rate in RATES:
         if len(feet) == round(rate * RUN_SECONDS):
             return rate

@@ -1,35 +1,33 @@
 """The sources of motion: where their files lie, whose they are, what reads them."""
 
+import logging
 import os
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Protocol
 
 from loco_drake.common.errors import InputError, check_choice
 from loco_drake.common.files import cache_dir
-from loco_drake.datasets.dog import read_dog
-from loco_drake.datasets.horse import read_horse
-from loco_drake.datasets.mpc import read_mpc
-from loco_drake.datasets.solo8 import read_solo8
+from loco_drake.datasets import dog, horse, mpc, solo8
+from loco_drake.datasets.conventions import measure
+from loco_drake.datasets.recording import (
+    Array,
+    Body,
+    Recording,
+    check_frames,
+    check_range,
+    check_rate,
+    start_along_x,
+)
 from loco_drake.motion.keypoints import KeypointClip
 
 DATA_VARIABLE = "LOCO_DRAKE_DATA"
-
-
-class Reader(Protocol):
-    """Reads frames ``start`` to ``end`` (exclusive) of one file as a clip."""
-
-    def __call__(
-        self,
-        path: Path,
-        *,
-        gait: str,
-        start: int | None = None,
-        end: int | None = None,
-        fps: float | None = None,
-    ) -> KeypointClip:
-        """Returns the clip; raises InputError for a file of another format."""
-        ...
+# Installed packages name their datasets in this group of entry points.
+ENTRY_POINTS = "loco_drake.datasets"
+# Notes on what was mended that contradicts the format, and is said aloud.
+MENDED = {"up", "turned", "swapped", "ground"}
 
 
 @dataclass(frozen=True)
@@ -37,53 +35,91 @@ class Dataset:
     """One source of motion.
 
     Attributes:
-        source: one of :data:`loco_drake.motion.gaits.SOURCES`.
+        source: its name, such as ``dog``: lower-case letters and digits.
         folder: name of its folder inside the data folder.
         licence: under which its files, and all that is made from them, may be used.
         attribution: whom to name.
-        read: reads one file.
+        read: reads one file: called with its path, the first frame and the frame after
+            the last that are wanted and the rate, each None if nobody says. It may
+            return more frames than are wanted. Raises InputError for another format.
+        body: what recordings are held to.
+        config: YAML file that says how it is retargeted, see
+            :mod:`loco_drake.retargeting.source_config`; None for
+            ``loco_drake/retargeting/sources/SOURCE.yaml``, else the defaults.
     """
 
     source: str
     folder: str
     licence: str
     attribution: str
-    read: Reader
+    read: Callable[[Path, int | None, int | None, float | None], Recording]
+    body: Body = field(default_factory=Body)
+    config: Path | None = None
 
 
-DATASETS = {
-    dataset.source: dataset
-    for dataset in (
-        Dataset(
-            source="dog",
-            folder="dog_mann",
-            licence="CC BY-NC 4.0",
-            attribution="Zhang, Starke, Komura, Saito 2018 (MANN, AI4Animation)",
-            read=read_dog,
-        ),
-        Dataset(
-            source="horse",
-            folder="horse_vhdc",
-            licence="CC BY-SA 4.0 (3.0 by another catalogue)",
-            attribution="Vienna Horse Data Collection (VHDC), Vetmeduni Vienna / Bonn",
-            read=read_horse,
-        ),
-        Dataset(
-            source="mpc",
-            folder="mpc_rfmpc",
-            licence="none stated (made with RF-MPC, MIT)",
-            attribution="LearnDiverseLoco's authors 2025, with RF-MPC by Yanran Ding",
-            read=read_mpc,
-        ),
-        Dataset(
-            source="solo8",
-            folder="solo8_cassi",
-            licence="BSD-3-Clause",
-            attribution="Li et al. 2023 (CASSI), as points by LearnDiverseLoco",
-            read=read_solo8,
-        ),
-    )
-}
+DATASETS: dict[str, Dataset] = {}
+
+
+def register_dataset(dataset: Dataset) -> None:
+    """Makes a source known to this process.
+
+    For all commands, name the dataset as an entry point of an installed package, in the
+    group ``loco_drake.datasets``.
+
+    Raises:
+        InputError: if its name or folder cannot be, or is taken.
+    """
+    if not (dataset.source.isalnum() and dataset.source.islower()):
+        raise InputError(
+            "The name of a source has lower-case letters and digits only, unlike "
+            f"{dataset.source!r}."
+        )
+    if dataset.folder in ("", ".", "..") or Path(dataset.folder).name != dataset.folder:
+        raise InputError(f"{dataset.folder!r} is not the name of a dataset's folder.")
+    for other in DATASETS.values():
+        if dataset.source == other.source or dataset.folder == other.folder:
+            raise InputError(
+                f"There is a source {other.source!r} in the folder {other.folder!r}."
+            )
+    DATASETS[dataset.source] = dataset
+
+
+for _dataset in (
+    Dataset(
+        source="dog",
+        folder="dog_mann",
+        licence="CC BY-NC 4.0",
+        attribution="Zhang, Starke, Komura, Saito 2018 (MANN, AI4Animation)",
+        read=dog.read_dog,
+        body=dog.BODY,
+    ),
+    Dataset(
+        source="horse",
+        folder="horse_vhdc",
+        licence="CC BY-SA 4.0 (3.0 by another catalogue)",
+        attribution="Vienna Horse Data Collection (VHDC), Vetmeduni Vienna / Bonn",
+        read=horse.read_horse,
+        body=horse.BODY,
+    ),
+    Dataset(
+        source="mpc",
+        folder="mpc_rfmpc",
+        licence="none stated (made with RF-MPC, MIT)",
+        attribution="LearnDiverseLoco's authors 2025, with RF-MPC by Yanran Ding",
+        read=mpc.read_mpc,
+        body=mpc.BODY,
+    ),
+    Dataset(
+        source="solo8",
+        folder="solo8_cassi",
+        licence="BSD-3-Clause",
+        attribution="Li et al. 2023 (CASSI), as points by LearnDiverseLoco",
+        read=solo8.read_solo8,
+        body=solo8.BODY,
+    ),
+    *(entry.load() for entry in entry_points(group=ENTRY_POINTS)),
+):
+    register_dataset(_dataset)
 
 
 def get_dataset(source: str) -> Dataset:
@@ -106,6 +142,9 @@ def read_clip(
 ) -> KeypointClip:
     """Reads one stretch of one recording, its licence in the provenance.
 
+    Its conventions are measured over the whole recording. What was mended stands in the
+    provenance, and is logged as a warning.
+
     Args:
         source: whose format the file has, a key of :data:`DATASETS`.
         path: the file.
@@ -116,14 +155,57 @@ def read_clip(
 
     Raises:
         InputError: if the source is unknown, the file not of its format, the stretch
-            not within it, or the rate not above 0.
+            not within it, or what it shows cannot be.
     """
-    dataset = get_dataset(source)
-    if fps is not None and not 0 < fps < float("inf"):
-        raise InputError(f"A rate must be above 0 frames/s, not {fps:g}.")
-    clip = dataset.read(path, gait=gait, start=start, end=end, fps=fps)
-    origin = {"licence": dataset.licence, "attribution": dataset.attribution}
-    return replace(clip, provenance={**clip.provenance, **origin})
+    dataset, path = get_dataset(source), Path(path)
+    if fps is not None:
+        check_rate(fps, "The recording")
+    try:
+        recording = dataset.read(path, start, end, fps)
+        recording = measure(recording, dataset.body, path)
+        points, first, stop = _stretch(recording, start, end, path)
+    except InputError:
+        raise
+    except Exception as error:  # whatever a reader stumbles over in a damaged file
+        raise InputError(
+            f"{path} cannot be read as a {source} recording: {type(error).__name__}."
+        ) from error
+    for name in MENDED & recording.notes.keys():
+        _warn(f"{path.name}: {name}: {recording.notes[name]}")
+    return KeypointClip(
+        source=source,
+        gait=gait,
+        fps=recording.fps,
+        withers=points[:, 0],
+        hip=points[:, 1],
+        toes=points[:, 2:],
+        provenance={
+            "file": path.name,
+            "frames": f"{first}-{stop}",
+            **recording.notes,
+            "licence": dataset.licence,
+            "attribution": dataset.attribution,
+        },
+    )
+
+
+def _stretch(
+    recording: Recording, start: int | None, end: int | None, path: Path
+) -> tuple[Array, int, int]:
+    """Returns a stretch that starts along +x, its first frame, and that after it."""
+    total = recording.first + len(recording.points)
+    if start is None:
+        start = recording.first if recording.start is None else recording.start
+    first, stop = check_range(start, end, total, path.name)
+    part = recording.points[first - recording.first : stop - recording.first]
+    check_frames(part, path)
+    return start_along_x(part), first, stop
+
+
+@cache
+def _warn(text: str) -> None:
+    """Logs a warning once, however often a process reads the file."""
+    logging.getLogger(__name__).warning("%s", text)
 
 
 def data_target(path: Path | None = None) -> Path:

@@ -1,17 +1,30 @@
 """Which stretch of which file holds which gait: ``segments.csv`` of the data folder."""
 
+import csv
+import io
+import logging
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.files import atomic_path
+from loco_drake.datasets.recording import check_rate
 from loco_drake.datasets.registry import DATASETS, read_clip
-from loco_drake.datasets.segment_table import read_rows
+from loco_drake.datasets.text import is_inside, read_text
+from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.keypoints import KeypointClip
+
+SHIPPED = Path(__file__).with_name("segments.csv")
+COLUMNS = ("dataset", "file", "gait", "start_frame", "end_frame", "fps")
+
+Row = dict[str, str]
 
 # Horse<animal>_M<day of measurement>_<gait><number>...
 _HORSE = re.compile(r"(Horse\d+)_M\d+_")
+# Gaits are parts of the names of files.
+_GAIT = re.compile(r"\w{1,40}")
 
 
 @dataclass(frozen=True)
@@ -19,12 +32,15 @@ class Segment:
     """A stretch of a recording that holds one gait.
 
     Attributes:
-        source: one of :data:`loco_drake.motion.gaits.SOURCES`.
+        source: a key of :data:`loco_drake.datasets.registry.DATASETS`.
         path: the file.
         gait: name of the gait; need not be one of the fifteen labels.
         start: first frame, from 0, at the file's own rate.
         end: frame after the last.
         fps: frames per second of the file.
+
+    Raises:
+        InputError: if it cannot be a stretch.
     """
 
     source: str
@@ -33,6 +49,16 @@ class Segment:
     start: int
     end: int
     fps: float
+
+    def __post_init__(self) -> None:
+        if not _GAIT.fullmatch(self.gait):
+            raise InputError(
+                "The name of a gait has up to 40 letters, digits and underscores, and "
+                "nothing else."
+            )
+        if not 0 <= self.start < self.end:
+            raise InputError(f"Frames {self.start} to {self.end} are no stretch.")
+        check_rate(self.fps, "The stretch")
 
     @property
     def name(self) -> str:
@@ -89,25 +115,113 @@ class Segment:
         return replace(clip, provenance={**clip.provenance, **origin})
 
 
+def read_rows(table: Path) -> list[Row]:
+    """Returns the rows of a table, without checking what their cells hold.
+
+    Raises:
+        InputError: if there is no such file, it is not a CSV table, or a row lacks one
+            of ``COLUMNS``.
+    """
+    return [row for _, row in _numbered_rows(table)]
+
+
+def _numbered_rows(table: Path) -> Iterator[tuple[int, Row]]:
+    """Yields number of the line and cells of each row that is not blank."""
+    text = read_text(table, "a CSV table")
+    header = text.partition("\n")[0]
+    reader = csv.DictReader(
+        io.StringIO(text, newline=""), delimiter=";" if "," not in header else ","
+    )
+    names = [name.strip().lower() for name in reader.fieldnames or ()]
+    if lacking := [name for name in COLUMNS if name not in names]:
+        raise InputError(f"{table}: line 1 lacks {', '.join(lacking)}.")
+    try:
+        for cells in reader:
+            line = reader.line_num
+            if None in cells:
+                raise InputError(
+                    f"{table}: line {line} has more cells than the header."
+                )
+            row = {k.strip().lower(): (v or "").strip() for k, v in cells.items()}
+            missing = [name for name in COLUMNS if not row.get(name)]
+            if any(row.values()) and missing:
+                raise InputError(f"{table}: line {line} lacks {', '.join(missing)}.")
+            if not missing:
+                yield line, row
+    except csv.Error:
+        raise InputError(
+            f"{table} is damaged: after line {reader.line_num} it is not a CSV table."
+        ) from None
+
+
+def write_rows(table: Path, rows: Iterable[Row]) -> None:
+    """Writes a table with the columns of all rows."""
+    rows = list(rows)
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    with (
+        atomic_path(table) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = csv.DictWriter(file, columns, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def add_shipped_rows(rows: Iterable[Row], files: Iterable[str]) -> list[Row]:
+    """Returns a table with the shipped stretches of some files added.
+
+    A file that the table already speaks of keeps the rows that it has there, which may
+    be the user's own. The order is that of the shipped table, whatever was added first;
+    rows of other files come last.
+
+    Args:
+        rows: the table so far.
+        files: names of files inside the data folder, such as
+            ``dog_mann/keypoints/dog_walk00.txt``.
+    """
+    own = _by_file(rows)
+    added = set(files)
+    merged = []
+    for name, stretches in _by_file(read_rows(SHIPPED)).items():
+        if name in own:
+            merged += own.pop(name)
+        elif name in added:
+            merged += stretches
+    return merged + [row for stretches in own.values() for row in stretches]
+
+
+def _by_file(rows: Iterable[Row]) -> dict[str, list[Row]]:
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(f"{row['dataset']}/{row['file']}", []).append(row)
+    return found
+
+
 def read_segments(data_dir: Path) -> list[Segment]:
     """Returns the segments of all sources that can be read, in the file's order.
 
     Raises:
-        InputError: if ``segments.csv`` is missing or damaged.
+        InputError: if ``segments.csv`` is missing or damaged, a row cannot be or
+            repeats another, or none is of a source that can be read.
     """
     table = Path(data_dir) / "segments.csv"
-    sources = {dataset.folder: dataset.source for dataset in DATASETS.values()}
-    try:
-        rows = read_rows(table)
-    except OSError:
+    if not table.is_file():
         raise InputError(
             f"The data folder {str(data_dir)!r} lacks segments.csv; "
             "loco-drake data fetch writes it."
-        ) from None
-    segments = []
-    for line, row in enumerate(rows, start=2):
+        )
+    sources = {dataset.folder: dataset.source for dataset in DATASETS.values()}
+    segments: dict[str, Segment] = {}
+    lines: dict[str, int] = {}
+    unknown = []
+    for line, row in _numbered_rows(table):
         if row["dataset"] not in sources:
+            unknown.append(line)
             continue
+        if not is_inside(row["file"]):
+            raise InputError(
+                f"{table}: line {line} names no file inside the folder of its dataset."
+            )
         try:
             segment = Segment(
                 source=sources[row["dataset"]],
@@ -117,16 +231,26 @@ def read_segments(data_dir: Path) -> list[Segment]:
                 end=int(row["end_frame"]),
                 fps=float(row["fps"]),
             )
+        except InputError as error:
+            raise InputError(f"{table}: line {line} cannot be. {error}") from None
         except ValueError:
             raise InputError(
                 f"{table}: line {line} has frames or a rate that are not numbers."
             ) from None
-        if not (0 <= segment.start < segment.end and 0 < segment.fps < float("inf")):
+        if segment.name in segments:
             raise InputError(
-                f"{table}: line {line} has an empty or impossible stretch."
+                f"{table}: line {line} repeats line {lines[segment.name]}."
             )
-        segments.append(segment)
-    return segments
+        segments[segment.name], lines[segment.name] = segment, line
+    if unknown:
+        text = (
+            f"{table}: line {unknown[0]} is of another dataset than "
+            f"{', '.join(sources)}"
+        )
+        if not segments:
+            raise InputError(f"{text}, as are all.")
+        logging.getLogger(__name__).warning("%s, and is left out.", text)
+    return list(segments.values())
 
 
 def one_format(segments: Iterable[Segment]) -> list[Segment]:
@@ -165,22 +289,32 @@ def select_labels(segments: Iterable[Segment], labels: Iterable[str]) -> list[Se
 def select_segments(
     segments: Iterable[Segment], source: str | None, gaits: Iterable[str]
 ) -> list[Segment]:
-    """Returns the segments of ``source`` (None: any) and of ``gaits`` (empty: any).
+    """Returns the segments of ``source`` (None: any) and of ``gaits``.
+
+    Without gaits they are those that hold one of the fifteen labels.
 
     Raises:
         InputError: if a gait, or everything, has no segment; names those that do.
     """
     of_source = [s for s in segments if source in (None, s.source)]
+    name, wanted = source or "any source", list(gaits)
     if not of_source:
-        raise InputError(
-            f"segments.csv has no stretch of the source {source or 'any'!r}."
-        )
+        raise InputError(f"segments.csv has no stretch of {name}.")
     available = list(dict.fromkeys(segment.gait for segment in of_source))
-    wanted = list(gaits)
     for gait in wanted:
         if gait not in available:
             raise InputError(
-                f"segments.csv has no {gait!r} of {source or 'any source'}; "
-                f"the choices are {', '.join(available)}."
+                f"segments.csv has no {gait!r} of {name}; the choices are "
+                f"{', '.join(available)}."
             )
-    return [s for s in of_source if not wanted or s.gait in wanted]
+    if wanted:
+        return [s for s in of_source if s.gait in wanted]
+    labels = {str(label) for label in LABELS}
+    found = [s for s in of_source if s.label in labels]
+    if not found:
+        there = ", ".join(dict.fromkeys(segment.label for segment in of_source))
+        raise InputError(
+            f"segments.csv has none of the fifteen gaits of {name}, only {there}: name "
+            f"what to take with --gait {available[0]}."
+        )
+    return found

@@ -13,7 +13,7 @@ import pytest
 
 from loco_drake.cli.fetch import describe_licence
 from loco_drake.cli.main import main
-from loco_drake.datasets import manifest, segment_table
+from loco_drake.datasets import download, segments
 from loco_drake.datasets.registry import DATASETS
 from tests.mirror_server import serve
 from tests.process import HEAR_CTRL_C, LIMIT
@@ -39,8 +39,8 @@ def mirror(tmp_path, monkeypatch):
         rows.append([name, "owner/name", "0" * 40, name, len(content), checksum])
     with (tmp_path / "manifest.csv").open("w", newline="") as file:
         csv.writer(file).writerows(rows)
-    monkeypatch.setattr(manifest, "MANIFEST", tmp_path / "manifest.csv")
-    monkeypatch.setattr(segment_table, "SHIPPED", folder / "segments.csv")
+    monkeypatch.setattr(download, "MANIFEST", tmp_path / "manifest.csv")
+    monkeypatch.setattr(segments, "SHIPPED", folder / "segments.csv")
     monkeypatch.setenv("LOCO_DRAKE_CACHE", str(tmp_path / "cache"))
     monkeypatch.delenv("LOCO_DRAKE_DATA", raising=False)
     monkeypatch.setenv("NO_PROXY", "127.0.0.1")
@@ -112,7 +112,7 @@ def test_own_segments_stay_and_the_folder_of_the_variable_is_used(
     (data / "segments.csv").write_text(own)
     monkeypatch.setenv("LOCO_DRAKE_DATA", str(data))
     assert main(["data", "fetch", "--mirror", str(mirror)]) == 0
-    rows = segment_table.read_rows(data / "segments.csv")
+    rows = segments.read_rows(data / "segments.csv")
     assert [row["file"] for row in rows] == [
         *(name.removeprefix("dog_mann/") for name in FILES),
         "mine.txt",
@@ -128,15 +128,15 @@ def test_a_damaged_table_in_the_way_is_refused_before_the_download(
     assert (
         main(["data", "fetch", "--mirror", str(mirror), "--data-dir", str(data)]) == 2
     )
-    assert "line 2 lacks dataset" in capsys.readouterr().err
+    assert "line 1 lacks dataset" in capsys.readouterr().err
     assert names_in(data) == ["segments.csv"]
 
 
 def test_many_failures_are_counted_not_all_listed(mirror, tmp_path, capsys):
     (tmp_path / "empty").mkdir()
-    header, row, *_ = manifest.MANIFEST.read_text().splitlines()
+    header, row, *_ = download.MANIFEST.read_text().splitlines()
     rows = [row.replace("made_pace", f"made_{i}", 1) for i in range(14)]
-    manifest.MANIFEST.write_text("\n".join([header, *rows]) + "\n")
+    download.MANIFEST.write_text("\n".join([header, *rows]) + "\n")
     assert main(["data", "fetch", "--mirror", str(tmp_path / "empty")]) == 1
     printed = capsys.readouterr()
     assert printed.err.count("cannot be read from the mirror: No such file") == 10
@@ -150,9 +150,9 @@ import sys
 from pathlib import Path
 
 from loco_drake.cli.main import main
-from loco_drake.datasets import manifest
+from loco_drake.datasets import download
 
-manifest.MANIFEST = Path(sys.argv[1])
+download.MANIFEST = Path(sys.argv[1])
 raise SystemExit(main(["data", "fetch", "--mirror", sys.argv[2]]))
 """
 
@@ -160,7 +160,7 @@ raise SystemExit(main(["data", "fetch", "--mirror", sys.argv[2]]))
 def test_ctrl_c_leaves_whole_files_only(mirror, tmp_path):
     with serve(mirror) as server:
         server.stalled.add(FILES[1])
-        arguments = [str(manifest.MANIFEST), server.url]
+        arguments = [str(download.MANIFEST), server.url]
         with subprocess.Popen(
             [sys.executable, "-c", HEAR_CTRL_C + INTERRUPTED, *arguments],
             stdout=subprocess.DEVNULL,

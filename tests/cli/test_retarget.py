@@ -232,13 +232,15 @@ def test_recording_never_seen_before_needs_neither_code_nor_segments(tmp_path, s
     assert (tmp_path / f"{source}-{gait}-{file.stem}-30-70.npz").is_file()
 
 
-def test_rate_given_by_hand_is_taken(tmp_path):
-    """The same 720 frames are twice as long at 60 frames/s."""
+def test_rate_given_by_hand_is_taken_unless_the_strides_contradict_it(tmp_path):
+    """720 frames at 100 frames/s are 7.2 s, at 60 twice as long as the 120 in them."""
     file = write_recording("horse", tmp_path)
-    options = ("--source", "horse", "--gait", "trot", "--out", tmp_path, "--fps", 60)
-    assert command(file, *options).run() == 0
+    options = ("--source", "horse", "--gait", "trot", "--out", tmp_path)
+    assert command(file, *options, "--fps", 100).run() == 0
     motion = load_motion(tmp_path / f"horse-trot-{file.stem}-0-720.npz")
-    assert len(motion) == pytest.approx(600, abs=1)
+    assert len(motion) == pytest.approx(360, abs=1)
+    with pytest.raises(InputError, match="motion tells that it has 120"):
+        command(file, *options, "--fps", 60).run()
     with pytest.raises(InputError, match="--fps need a FILE"):
         command("--fps", 60, "--out", tmp_path).run()
 

@@ -6,8 +6,7 @@ import socket
 import pytest
 
 from loco_drake.common.errors import InputError
-from loco_drake.datasets.download import download_files, is_present, parse_mirror
-from loco_drake.datasets.manifest import RemoteFile
+from loco_drake.datasets.download import RemoteFile, download_files, parse_mirror
 from tests.mirror_server import serve
 
 NAMES = (
@@ -65,7 +64,7 @@ def test_all_files_arrive_with_one_request_each(mirror, files, tmp_path):
         assert fetch(files, folder, parse_mirror(f"{server.url}/")) == {}
         assert server.asked == list(NAMES)
     assert content_of(folder) == CONTENTS
-    assert all(is_present(file, folder) for file in files)
+    assert all(file.is_present(folder) for file in files)
 
 
 def test_files_arrive_from_a_folder(mirror, files, tmp_path):
@@ -85,7 +84,7 @@ def test_a_cut_connection_leaves_nothing_and_the_next_run_completes(
 
         server.cut.clear()
         server.asked.clear()
-        missing = [file for file in files if not is_present(file, folder)]
+        missing = [file for file in files if not file.is_present(folder)]
         assert fetch(missing, folder, server.url) == {}
         assert server.asked == [NAMES[1]]
     assert content_of(folder) == CONTENTS
@@ -115,7 +114,7 @@ def test_a_wrong_file_in_the_way_is_replaced(mirror, files, tmp_path):
     path = tmp_path / NAMES[0]
     path.parent.mkdir()
     path.write_bytes(CONTENTS[NAMES[0]][::-1])
-    assert not is_present(files[0], tmp_path)
+    assert not files[0].is_present(tmp_path)
     assert fetch(files[:1], tmp_path, mirror) == {}
     assert path.read_bytes() == CONTENTS[NAMES[0]]
 

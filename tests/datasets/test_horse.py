@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from loco_drake.common.errors import InputError
-from loco_drake.datasets.horse import read_horse
+from loco_drake.datasets.registry import read_clip
 from loco_drake.datasets.segments import read_segments
 from tests.synthetic_horse import (
     GAITS,
@@ -41,7 +41,7 @@ def test_treadmill_is_undone(tmp_path, gait, fps, name, form):
     horse = make_horse(gait, fps)
     path = tmp_path / f"{name}.txt"
     (write_raw_recording if form == "raw" else write_world_recording)(path, horse)
-    clip = read_horse(path, gait=gait)
+    clip = read_clip("horse", path, gait=gait)
     assert (clip.source, clip.gait, clip.fps) == ("horse", gait, fps)
     assert speed_of(clip) == pytest.approx(horse.gait.speed, rel=0.01)
     assert stance_slide(clip, horse.contacts) < 0.03
@@ -63,8 +63,10 @@ def test_both_forms_of_a_recording_give_the_same_clip(tmp_path):
     horse = make_horse("trot", 120.0)
     write_raw_recording(tmp_path / "a.csv", horse)
     write_world_recording(tmp_path / "Horse1_M2_trot.txt", horse)
-    raw = read_horse(tmp_path / "a.csv", gait="trot", start=100, end=500)
-    world = read_horse(tmp_path / "Horse1_M2_trot.txt", gait="trot", start=100, end=500)
+    raw = read_clip("horse", tmp_path / "a.csv", gait="trot", start=100, end=500)
+    world = read_clip(
+        "horse", tmp_path / "Horse1_M2_trot.txt", gait="trot", start=100, end=500
+    )
     np.testing.assert_allclose(raw.withers, world.withers, atol=1e-4)
     np.testing.assert_allclose(raw.toes, world.toes, atol=1e-4)
 
@@ -76,13 +78,13 @@ def test_swapped_hooves_are_swapped_back_and_it_is_said(tmp_path, swapped, form)
     path = tmp_path / "horse.txt"
     write = write_raw_recording if form == "raw" else write_world_recording
     write(path, horse, swapped)
-    clip = read_horse(path, gait="trot")
+    clip = read_clip("horse", path, gait="trot")
     said = " and ".join(("front", "rear")[pair] for pair in swapped)
-    assert clip.provenance["swapped"] == f"left and right {said} hooves"
+    assert clip.provenance["swapped"] == f"left and right {said} toes exchanged"
     np.testing.assert_allclose(clip.toes[..., 2], horse.toes[..., 2], atol=1e-4)
     assert (clip.toes[:, [0, 2], 1] > 0).all()
     write(path, horse)
-    assert "swapped" not in read_horse(path, gait="trot").provenance
+    assert "swapped" not in read_clip("horse", path, gait="trot").provenance
 
 
 @pytest.mark.parametrize("gait", GAITS)
@@ -93,14 +95,14 @@ def test_rate_is_told_by_the_strides_if_the_name_is_silent(tmp_path, gait, fps):
     path = tmp_path / "unknown.txt"
     for swapped in ((), (0,), (1,)):
         write_world_recording(path, horse, swapped)
-        assert read_horse(path, gait="x").fps == fps
+        assert read_clip("horse", path, gait="x").fps == fps
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(lines[: round(2.5 * horse.gait.period * fps)]))
-    assert read_horse(path, gait="x").fps == fps
+    assert read_clip("horse", path, gait="x").fps == fps
     path.write_text("".join(lines[: round(horse.gait.period * fps)]))
     with pytest.raises(InputError, match="--fps 60 or --fps 120"):
-        read_horse(path, gait="x")
-    assert read_horse(path, gait="x", fps=120.0).fps == 120.0
+        read_clip("horse", path, gait="x")
+    assert read_clip("horse", path, gait="x", fps=120.0).fps == 120.0
 
 
 def test_short_gaps_are_bridged_and_those_of_the_head_do_not_matter(tmp_path):
@@ -109,8 +111,8 @@ def test_short_gaps_are_bridged_and_those_of_the_head_do_not_matter(tmp_path):
     gaps = ((1, 200, 210), (5, 300, 304), (0, 400, 520))
     write_raw_recording(tmp_path / "gaps.csv", horse, gaps=gaps)
     write_raw_recording(tmp_path / "whole.csv", horse)
-    clip = read_horse(tmp_path / "gaps.csv", gait="walk")
-    whole = read_horse(tmp_path / "whole.csv", gait="walk")
+    clip = read_clip("horse", tmp_path / "gaps.csv", gait="walk")
+    whole = read_clip("horse", tmp_path / "whole.csv", gait="walk")
     assert clip.provenance["gaps"] == "14 frames bridged"
     np.testing.assert_allclose(clip.withers, whole.withers, atol=0.003)
     np.testing.assert_allclose(clip.toes, whole.toes, atol=0.01)
@@ -119,13 +121,16 @@ def test_short_gaps_are_bridged_and_those_of_the_head_do_not_matter(tmp_path):
 def test_long_gap_limits_the_clip_to_its_longer_side(tmp_path):
     horse = make_horse("walk", 120.0)
     write_raw_recording(tmp_path / "a.csv", horse, gaps=((4, 150, 180),))
-    clip = read_horse(tmp_path / "a.csv", gait="walk")
+    clip = read_clip("horse", tmp_path / "a.csv", gait="walk")
     assert clip.provenance["frames"] == "180-720"
-    assert len(read_horse(tmp_path / "a.csv", gait="walk", start=0, end=150)) == 150
+    assert (
+        len(read_clip("horse", tmp_path / "a.csv", gait="walk", start=0, end=150))
+        == 150
+    )
     with pytest.raises(
         InputError, match=r"missing within frames 100 to 200 .* 180 to 720"
     ):
-        read_horse(tmp_path / "a.csv", gait="walk", start=100, end=200)
+        read_clip("horse", tmp_path / "a.csv", gait="walk", start=100, end=200)
 
 
 def test_names_of_columns_tell_their_order(tmp_path):
@@ -136,7 +141,9 @@ def test_names_of_columns_tell_their_order(tmp_path):
     order = [1, 0, *range(2, 11), *range(20, 23), *range(11, 20)]
     text = "\n".join(",".join(row[k] for k in order) for row in rows).replace('"', "")
     (tmp_path / "b.csv").write_text(text)
-    a, b = (read_horse(tmp_path / name, gait="trot") for name in ("a.csv", "b.csv"))
+    a, b = (
+        read_clip("horse", tmp_path / name, gait="trot") for name in ("a.csv", "b.csv")
+    )
     np.testing.assert_array_equal(a.toes, b.toes)
 
 
@@ -146,7 +153,7 @@ def test_names_of_columns_tell_their_order(tmp_path):
         ("HHLX", "HHL", "header lacks HHLX"),
         ("\n3,0.033", "\n3,0.055", "line 4 the time does not go on evenly"),
         ("\n3,0.033", "\n3,", "time column is incomplete"),
-        ("\n3,0.033", "\n3,0.033,0.033", "line 4 has 24 comma-separated columns"),
+        ("\n3,0.033", "\n3,0.033,0.033", "line 4 has 24 columns"),
         ("\n3,0.033", "\n3,soon", "line 4 holds something that is not a number"),
     ],
 )
@@ -156,15 +163,15 @@ def test_damaged_raw_file_is_refused_with_the_reason(tmp_path, old, new, reason)
     assert old in text
     (tmp_path / "a.csv").write_text(text.replace(old, new, 1))
     with pytest.raises(InputError, match=reason):
-        read_horse(tmp_path / "a.csv", gait="trot")
+        read_clip("horse", tmp_path / "a.csv", gait="trot")
 
 
 def test_horse_in_millimetres_without_a_header_is_refused(tmp_path):
     path = tmp_path / "Horse1_M1_trot1.txt"
     write_world_recording(path, make_horse("trot", 60.0, 2.0))
     np.savetxt(path, 1000 * np.loadtxt(path, delimiter=","), delimiter=",")
-    with pytest.raises(InputError, match=r"740 m long, not .* \(is the unit right"):
-        read_horse(path, gait="trot")
+    with pytest.raises(InputError, match=r"740 m long, not .* \(is the unit of length"):
+        read_clip("horse", path, gait="trot")
 
 
 @pytest.mark.parametrize(
@@ -175,8 +182,8 @@ def test_real_horse_goes_at_the_speed_of_the_belt(real_data, name, belt):
     """Within 3 % of the documented belt, from either form, hooves as still as raw."""
     folder = real_data / "horse_vhdc"
     stem = f"Horse1_{name}_kinematics"
-    raw = read_horse(folder / "raw_csv" / f"{stem}.csv", gait="x")
-    world = read_horse(folder / "keypoints_world" / f"{stem}.txt", gait="x")
+    raw = read_clip("horse", folder / "raw_csv" / f"{stem}.csv", gait="x")
+    world = read_clip("horse", folder / "keypoints_world" / f"{stem}.txt", gait="x")
     assert raw.fps == world.fps == (60.0 if "M1" in name else 120.0)
     for clip in (raw, world):
         assert speed_of(clip) == pytest.approx(belt, rel=0.03)
@@ -190,7 +197,9 @@ def test_real_horse_goes_at_the_speed_of_the_belt(real_data, name, belt):
 def test_real_front_hooves_that_are_swapped_are_found_alone(real_data):
     """Horse1_M2_trot2, and none of the other 83."""
     folder = real_data / "horse_vhdc" / "keypoints_world"
-    clips = {path.name: read_horse(path, gait="x") for path in folder.glob("*.txt")}
+    clips = {
+        path.name: read_clip("horse", path, gait="x") for path in folder.glob("*.txt")
+    }
     swapped = {name for name, clip in clips.items() if "swapped" in clip.provenance}
     assert swapped == {"Horse1_M2_trot2_kinematics.txt"}
 
@@ -202,7 +211,7 @@ def test_real_rates_are_those_of_the_strides(real_data, tmp_path):
         if segment.source != "horse" or segment.path.suffix != ".txt":
             continue
         (tmp_path / "copy.txt").write_bytes(segment.path.read_bytes())
-        clip = read_horse(tmp_path / "copy.txt", gait="x")
+        clip = read_clip("horse", tmp_path / "copy.txt", gait="x")
         assert clip.fps == segment.fps
         if segment.path.stem.startswith("Horse1_"):
             x = clip.toes[:, 2, 0] - clip.hip[:, 0]

@@ -2,9 +2,9 @@ import hashlib
 import re
 from collections import Counter
 
-from loco_drake.datasets.manifest import MANIFEST, files_by_source, read_manifest
+from loco_drake.datasets.download import MANIFEST, files_by_source, read_manifest
 from loco_drake.datasets.registry import DATASETS
-from loco_drake.datasets.segment_table import SHIPPED, read_rows
+from loco_drake.datasets.segments import SHIPPED, read_rows
 from loco_drake.motion.gaits import LABELS
 
 

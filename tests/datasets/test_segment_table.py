@@ -1,8 +1,8 @@
 import pytest
 
 from loco_drake.common.errors import InputError
-from loco_drake.datasets import segment_table
-from loco_drake.datasets.segment_table import add_shipped_rows, read_rows, write_rows
+from loco_drake.datasets import segments
+from loco_drake.datasets.segments import add_shipped_rows, read_rows, write_rows
 
 
 def row(file, gait="trot", start=0, **more):
@@ -18,7 +18,7 @@ SHIPPED = [row("d/a"), row("d/b"), row("d/a", "pace", 90), row("e/c")]
 def shipped(tmp_path, monkeypatch):
     table = tmp_path / "shipped.csv"
     write_rows(table, SHIPPED)
-    monkeypatch.setattr(segment_table, "SHIPPED", table)
+    monkeypatch.setattr(segments, "SHIPPED", table)
 
 
 def test_rows_survive_writing_with_the_columns_of_all(tmp_path):

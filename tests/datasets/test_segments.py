@@ -38,9 +38,9 @@ def test_segment_reads_its_own_frames(made_data):
     [
         (HEADER + "dog_mann,a.txt,trot,10\n", "line 2 lacks end_frame, fps"),
         (HEADER + "dog_mann,a.txt,trot,x,70,60,1,\n", "line 2 has frames or a rate"),
-        (HEADER + "dog_mann,a.txt,trot,70,10,60,1,\n", "line 2 has an empty"),
-        (HEADER + "dog_mann,a.txt,trot,1,10,nan,1,\n", "line 2 has an empty"),
-        ("a,b\n1,2\n", "line 2 lacks dataset"),
+        (HEADER + "dog_mann,a.txt,trot,70,10,60,1,\n", "line 2 .* Frames 70 to 10"),
+        (HEADER + "dog_mann,a.txt,trot,1,10,nan,1,\n", "line 2 .* 10 to 1000"),
+        ("a,b\n1,2\n", "line 1 lacks dataset"),
     ],
 )
 def test_damaged_table_is_refused_with_the_line(tmp_path, text, reason):
@@ -52,7 +52,7 @@ def test_missing_and_binary_tables_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"lacks segments\.csv"):
         read_segments(tmp_path)
     (tmp_path / "segments.csv").write_bytes(b"\xff\xfe\x00\x80")
-    with pytest.raises(InputError, match="not a CSV table"):
+    with pytest.raises(InputError, match=r"lacks dataset|not plain text"):
         read_segments(tmp_path)
 
 
@@ -62,7 +62,7 @@ def test_selection_by_source_and_gait(made_data):
     assert select_segments(segments, "dog", ["trot"]) == segments[1:2]
     with pytest.raises(InputError, match="the choices are pace, trot, gallop"):
         select_segments(segments, "dog", ["trot", "fly"])
-    with pytest.raises(InputError, match="no stretch of the source 'horse'"):
+    with pytest.raises(InputError, match="no stretch of horse"):
         select_segments(segments, "horse", ())
 
 

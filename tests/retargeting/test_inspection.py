@@ -2,7 +2,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from loco_drake.datasets.dog import read_dog
+from loco_drake.datasets.registry import read_clip
 from loco_drake.retargeting.inspection import clip_figure, summarize
 from tests.synthetic import GAITS, STANCE_HEIGHT, write_dog_recording
 
@@ -10,7 +10,7 @@ from tests.synthetic import GAITS, STANCE_HEIGHT, write_dog_recording
 @pytest.mark.parametrize("gait", ["pace", "trot", "gallop"])
 def test_summary_finds_the_gait_that_the_dog_was_made_with(tmp_path, gait):
     write_dog_recording(tmp_path / "dog.txt", gait, seconds=5.0)
-    summary, contacts = summarize(read_dog(tmp_path / "dog.txt", gait=gait))
+    summary, contacts = summarize(read_clip("dog", tmp_path / "dog.txt", gait=gait))
     made = GAITS[gait]
     assert summary.frames == len(contacts) == 300
     assert summary.stance_height_m == pytest.approx(STANCE_HEIGHT, abs=1e-4)
@@ -26,7 +26,7 @@ def test_summary_finds_the_gait_that_the_dog_was_made_with(tmp_path, gait):
 
 def test_standing_dog_has_no_stride(tmp_path):
     write_dog_recording(tmp_path / "dog.txt", "pace")
-    clip = read_dog(tmp_path / "dog.txt", gait="pace", end=6)
+    clip = read_clip("dog", tmp_path / "dog.txt", gait="pace", end=6)
     summary, _ = summarize(clip)
     assert summary.stride_period_s is None
     assert summary.duty_factor is summary.phase is None
@@ -35,7 +35,7 @@ def test_standing_dog_has_no_stride(tmp_path):
 def test_figure_shows_each_contact_as_a_bar(tmp_path):
     """Four rows of bars, each as long as its contact; a picture that is not blank."""
     write_dog_recording(tmp_path / "dog.txt", "trot")
-    clip = read_dog(tmp_path / "dog.txt", gait="trot")
+    clip = read_clip("dog", tmp_path / "dog.txt", gait="trot")
     _, contacts = summarize(clip)
     figure = clip_figure(clip, contacts, "a trot")
     bars = figure.axes[1].collections

@@ -1,9 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import yaw_of
-from loco_drake.datasets.dog import read_dog
+from loco_drake.datasets.registry import read_clip
 from loco_drake.datasets.segments import read_segments, select_segments
 from loco_drake.motion import quality
 from loco_drake.motion.keypoints import KeypointClip
@@ -29,7 +31,7 @@ def assert_good(report):
 def test_made_dog_becomes_a_motion_within_all_limits(tmp_path, robot, solver, gait):
     """At the scaled speed, heading along +x, at the robot's own height."""
     write_dog_recording(tmp_path / "dog.txt", gait)
-    clip = read_dog(tmp_path / "dog.txt", gait=gait)
+    clip = read_clip("dog", tmp_path / "dog.txt", gait=gait)
     motion, report = retarget_clip(clip, robot, solver=solver)
     assert_good(report)
     assert (motion.robot, motion.fps, str(motion.label)) == (
@@ -64,7 +66,7 @@ def test_toes_lie_where_the_formula_puts_them(tmp_path, robot, solver, gait):
     """
     write_dog_recording(tmp_path / "dog.txt", gait)
     motion, _ = retarget_clip(
-        read_dog(tmp_path / "dog.txt", gait=gait), robot, solver=solver
+        read_clip("dog", tmp_path / "dog.txt", gait=gait), robot, solver=solver
     )
     dog = make_dog(gait)
     scale = robot.stand_height / STANCE_HEIGHT
@@ -96,7 +98,7 @@ def test_toes_lie_where_the_formula_puts_them(tmp_path, robot, solver, gait):
 def test_feet_on_the_ground_are_those_of_the_dog(tmp_path, robot, solver):
     """Trot: diagonal pairs together, half a stride apart, at the dog's duty factor."""
     write_dog_recording(tmp_path / "dog.txt", "trot")
-    clip = read_dog(tmp_path / "dog.txt", gait="trot")
+    clip = read_clip("dog", tmp_path / "dog.txt", gait="trot")
     motion, _ = retarget_clip(clip, robot, solver=solver)
     p_WF = quality.toe_trajectories(motion, robot)
     down = p_WF[..., 2] - robot.foot_radius < 1e-3
@@ -126,7 +128,7 @@ def test_sliding_recording_gives_still_feet_and_a_larger_correction(
     tmp_path, robot, solver
 ):
     dog = write_dog_recording(tmp_path / "dog.txt", "pace")
-    clip = read_dog(tmp_path / "dog.txt", gait="pace")
+    clip = read_clip("dog", tmp_path / "dog.txt", gait="pace")
     _, still = retarget_clip(clip, robot, solver=solver)
     slid_clip = sliding(clip, dog.contacts, 0.15)
     _, slid = retarget_clip(slid_clip, robot, solver=solver)
@@ -158,7 +160,7 @@ def test_giant_strides_stay_within_limits_at_the_price_of_correction(
 ):
     """Toes that swing twice as far as a leg is long: 0 violations, and it is said."""
     write_dog_recording(tmp_path / "dog.txt", "pace")
-    clip = read_dog(tmp_path / "dog.txt", gait="pace")
+    clip = read_clip("dog", tmp_path / "dog.txt", gait="pace")
     clip.toes[..., 0] += 0.6 * np.sin(2 * np.pi * np.arange(len(clip)) / 60)[:, None]
     motion, report = retarget_clip(clip, robot, solver=solver)
     assert report.joint_limit_violations == 0
@@ -170,7 +172,7 @@ def test_giant_strides_stay_within_limits_at_the_price_of_correction(
 def test_config_given_by_hand_is_used(tmp_path, robot, solver):
     """A trunk 3 cm lower than the scale has it."""
     write_dog_recording(tmp_path / "dog.txt", "pace")
-    clip = read_dog(tmp_path / "dog.txt", gait="pace")
+    clip = read_clip("dog", tmp_path / "dog.txt", gait="pace")
     config = load_config("dog")
     config.base_height_offset = -0.03
     motion, _ = retarget_clip(clip, robot, config=config, solver=solver)
@@ -180,7 +182,7 @@ def test_config_given_by_hand_is_used(tmp_path, robot, solver):
 
 def test_same_clip_gives_the_same_motion_whatever_was_solved_before(tmp_path, robot):
     write_dog_recording(tmp_path / "dog.txt", "pace", seconds=1.0)
-    clip = read_dog(tmp_path / "dog.txt", gait="pace")
+    clip = read_clip("dog", tmp_path / "dog.txt", gait="pace")
     solver = LegSolver(robot, FPS)
     first, _ = retarget_clip(clip, robot, solver=solver)
     second, _ = retarget_clip(clip, robot, solver=solver)
@@ -189,7 +191,8 @@ def test_same_clip_gives_the_same_motion_whatever_was_solved_before(tmp_path, ro
 
 def test_clip_of_two_frames_is_refused(tmp_path, robot, solver):
     write_dog_recording(tmp_path / "dog.txt", "pace", seconds=1.0)
-    clip = read_dog(tmp_path / "dog.txt", gait="pace", end=2)
+    clip = read_clip("dog", tmp_path / "dog.txt", gait="pace")
+    clip = replace(clip, withers=clip.withers[:2], hip=clip.hip[:2], toes=clip.toes[:2])
     with pytest.raises(InputError, match="at least 4 frames"):
         retarget_clip(clip, robot, solver=solver)
 

@@ -1,0 +1,287 @@
+"""Axes, sides, ground and rate of a recording: measured, then mended or refused.
+
+A file's format says which axis is up, which toe is the left one in front, and how many
+frames make a second; files in circulation often differ. The motion contradicts a wrong
+convention: a trunk is above its toes, toes on the left are left of it, feet stand on
+the ground, and a stride takes as long as gravity lets it (Alexander and Jayes 1983).
+All readers' recordings pass here.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from loco_drake.common.errors import InputError
+from loco_drake.datasets.recording import (
+    Array,
+    Body,
+    Recording,
+    all_seen,
+    check_frames,
+    check_rate,
+)
+from loco_drake.motion.gait_timing import Track, stride_period
+
+GRAVITY = 9.81
+AXES = "xyz"
+# The trunk's middle is this near to straight above the toes, as a cosine.
+UPRIGHT = 0.9
+# ... and even while an animal sits, or rears, no further from it than this.
+ASKEW = 0.5
+# Offsets of toes from the middle of the trunk that tell sides, in trunk lengths. In all
+# recordings known here, left is .06 or more to the left of right, front .5 ahead.
+SIDEWAYS, LENGTHWISE = 0.02, 0.1
+# Orders of withers, hip and toes in which front and rear are exchanged.
+TURNED = {
+    (0, 1, 4, 5, 2, 3): "toes",
+    (1, 0, 2, 3, 4, 5): "trunk",
+    (1, 0, 4, 5, 2, 3): "trunk and toes",
+}
+TOES_EXCHANGED, TRUNK_EXCHANGED, BOTH_EXCHANGED = TURNED
+# Markers of standing toes sit this low or high in each recording; the tenth percentile
+# of a toe's height lies well within stance, which is a quarter of a gallop.
+STANCE_PERCENTILE = 10.0
+# A ground off by more, in body sizes, is the file's and not the markers'.
+GROUND = 0.045
+# Bounds of what a body does, in its sizes: the trunk's departure from a straight line
+# within a frame, its length over the median, a toe's distance from it and depth.
+TRUNK_JUMP = 0.12
+TRUNK_STRETCH = 0.3
+REACH = 1.7
+DEPTH = 0.25
+# Toes that move fore and aft by less take no strides.
+STILL = 0.01
+# Fastest trunk, in units of sqrt(g height); a greyhound reaches 7.
+FASTEST = 10.0
+
+
+def measure(recording: Recording, body: Body, path: Path) -> Recording:
+    """Returns a recording with its conventions mended, checked against its body.
+
+    Args:
+        recording: as a reader returns it.
+        body: what recordings of its source are held to.
+        path: of the file, for messages.
+
+    Raises:
+        InputError: if it cannot be such a recording; names the frame, or the figure.
+    """
+    points, notes = recording.points, dict(recording.notes)
+    if points.shape[1:] != (6, 3) or not np.isfinite(points).all():
+        raise InputError(f"{path} lacks points of the body.")
+    check_rate(recording.fps, str(path))
+    points = put_on_ground(orient(points, body, path, notes), body, notes)
+    recording = replace(recording, points=points, notes=notes)
+    check_motion(recording, body, path)
+    return recording
+
+
+def orient(points: Array, body: Body, path: Path, notes: dict[str, str]) -> Array:
+    """Returns points (T, 6, 3) with z up and each toe where its name says.
+
+    Readers that need this themselves call it, too: what is right stays as it is.
+
+    Args:
+        points: withers, hip, toes FL, FR, RL, RR in m; NaN where one was not seen.
+        body: how large it may be.
+        path: of the file, for messages.
+        notes: is told what was mended.
+
+    Raises:
+        InputError: if it cannot be told which way is up, the size cannot be, or there
+            are too few frames.
+    """
+    check_frames(points, path)
+    if not all_seen(points).any():
+        return points
+    points = _turn_up(points, path, notes)
+    seen = points[all_seen(points)]
+    for name, value, (low, high) in (
+        ("long", _trunk_length(seen), body.trunk),
+        ("high over the toes", _height(seen), body.height),
+    ):
+        if not low <= value <= high:
+            raise InputError(
+                f"{path}: the trunk would be {value:.3g} m {name}, not {low} to {high} "
+                "m (is the unit of length that of the format?)."
+            )
+    return _name_toes(points, notes)
+
+
+def _turn_up(points: Array, path: Path, notes: dict[str, str]) -> Array:
+    seen = points[all_seen(points)]
+    up = np.median(seen[:, :2].mean(axis=1) - seen[:, 2:].mean(axis=1), axis=0)
+    if not np.linalg.norm(up) > 0 or not _trunk_length(seen) > 0:
+        raise InputError(f"{path}: the trunk has no length, or is in the ground.")
+    cosines = up / np.linalg.norm(up)
+    axis = int(np.argmax(np.abs(cosines)))
+    if abs(cosines[axis]) < UPRIGHT:
+        if cosines[2] > ASKEW:
+            return points
+        raise InputError(
+            f"{path}: which way is up cannot be told, since along no axis is the trunk "
+            "above the toes (are the columns those of the format?)."
+        )
+    if axis == 2 and cosines[2] > 0:
+        return points
+    sign = "-" if cosines[axis] < 0 else ""
+    notes["up"] = f"{sign}{AXES[axis]} turned to z"
+    turned = points[..., [(axis + 1) % 3, (axis + 2) % 3, axis]]
+    return turned * (1.0, -1.0, -1.0) if sign else turned
+
+
+def _name_toes(points: Array, notes: dict[str, str]) -> Array:
+    """Returns points with front toes in front and left toes on the left.
+
+    More than one exchange can explain what is seen. Animals go ahead for most of the
+    time, so that the way tells; without any, the least exchange is taken.
+    """
+    ahead, left, way = _offsets(points)
+    crossed = left[[0, 2]] - left[[1, 3]] < -SIDEWAYS
+    order = None
+    if ahead[:2].mean() - ahead[2:].mean() < -LENGTHWISE:
+        toes = not crossed.all() if abs(way) < 1 else way > 0
+        order = TOES_EXCHANGED if toes else TRUNK_EXCHANGED
+    elif crossed.all() and way < -1:
+        order = BOTH_EXCHANGED
+    if order is not None:
+        notes["turned"] = f"front and rear of {TURNED[order]} exchanged"
+        points = points[:, order]
+        _, left, _ = _offsets(points)
+    points, swapped = points.copy(), []
+    for name, k in (("front", 2), ("rear", 4)):
+        if left[k - 2] - left[k - 1] < -SIDEWAYS:
+            points[:, [k, k + 1]] = points[:, [k + 1, k]]
+            swapped.append(name)
+    if swapped:
+        notes["swapped"] = f"left and right {' and '.join(swapped)} toes exchanged"
+    return points
+
+
+def _offsets(points: Array) -> tuple[Array, Array, float]:
+    """Returns how far toes (4,) are ahead and to the left, and the way ahead.
+
+    All are means over the frames, or the sum, in trunk lengths.
+    """
+    points = points[all_seen(points)]
+    points = points / _trunk_length(points)
+    middle = points[:, :2].mean(axis=1)[:, :2]
+    forward = (points[:, 0] - points[:, 1])[:, :2]
+    left = np.stack((-forward[:, 1], forward[:, 0]), axis=-1)
+    toes = points[:, 2:, :2] - middle[:, None]
+    return (
+        (toes * forward[:, None]).sum(axis=-1).mean(axis=0),
+        (toes * left[:, None]).sum(axis=-1).mean(axis=0),
+        float((np.diff(middle, axis=0) * forward[1:]).sum()),
+    )
+
+
+def _trunk_length(points: Array) -> float:
+    return float(np.median(np.linalg.norm(points[:, 0] - points[:, 1], axis=-1)))
+
+
+def _height(points: Array) -> float:
+    """Returns the height in m of the trunk's middle when the animal is on its feet."""
+    ground = np.percentile(points[:, 2:, 2], STANCE_PERCENTILE, axis=0).mean()
+    return float(np.percentile(points[:, :2, 2].mean(axis=1), 75) - ground)
+
+
+def _size(points: Array) -> float:
+    """Returns the larger of the trunk's length and its height over the toes, in m."""
+    return max(_trunk_length(points), _height(points))
+
+
+def ground_height(points: Array) -> float:
+    """Returns the height of the ground in m; 0 if it is there as near as markers tell.
+
+    Where markers sit high on the toes of a pair, those of the other pair tell.
+    """
+    stance = np.percentile(points[:, 2:, 2], STANCE_PERCENTILE, axis=0)
+    ground = float(min(stance[:2].mean(), stance[2:].mean()))
+    return ground if abs(ground) > GROUND * _size(points) else 0.0
+
+
+def put_on_ground(points: Array, body: Body, notes: dict[str, str]) -> Array:
+    """Returns points (T, 6, 3) with the ground at z = 0, trunk and toes alike.
+
+    Toes that are markers are then moved by what is left, foot by foot.
+    """
+    points = points.copy()
+    if ground := ground_height(points):
+        points[..., 2] -= ground
+        notes["ground"] = f"moved from z = {ground:.3f} m to 0"
+    if body.markers:
+        stance = np.percentile(points[:, 2:, 2], STANCE_PERCENTILE, axis=0)
+        points[:, 2:, 2] -= stance
+    return points
+
+
+def check_motion(recording: Recording, body: Body, path: Path) -> None:
+    """Checks that a recording, z up on the ground, moves as such a body can.
+
+    Raises:
+        InputError: if steps, reach of the legs, speed or the rhythm of the strides
+            cannot be; names the first frame, or the figure.
+    """
+    points, fps = recording.points, recording.fps
+    trunk = np.linalg.norm(points[:, 0] - points[:, 1], axis=-1) / _trunk_length(points)
+    size = _size(points)
+    departure = np.linalg.norm(np.diff(points, n=2, axis=0), axis=-1)
+    jumps = departure > size * np.array([TRUNK_JUMP] * 2 + [body.jump] * 4)
+    reach = np.linalg.norm(points[:, 2:] - points[:, [0, 0, 1, 1]], axis=-1)
+    for reason, first, wrong in (
+        (
+            "a point jumps (are lines missing, out of order or damaged?)",
+            2,
+            jumps.any(axis=-1),
+        ),
+        (
+            "the trunk changes its length",
+            0,
+            np.abs(trunk - 1) > TRUNK_STRETCH,
+        ),
+        (
+            "a toe is further away than a leg is long",
+            0,
+            (reach > REACH * size).any(axis=-1),
+        ),
+        (
+            "a toe is under the ground",
+            0,
+            (points[:, 2:, 2] < -DEPTH * size).any(axis=-1),
+        ),
+    ):
+        if wrong.any():
+            frame = recording.first + first + int(np.argmax(wrong))
+            raise InputError(f"{path}: at frame {frame} {reason}.")
+
+    height = _height(points)
+    unit = np.sqrt(height / GRAVITY)
+    middle = points[:, :2].mean(axis=1)[:, :2]
+    speed = np.median(np.linalg.norm(np.diff(middle, axis=0), axis=-1)) * fps
+    period = stride_of(points, height)
+    low, high = body.stride
+    if speed > FASTEST * GRAVITY * unit or (
+        period is not None and not low <= period / fps / unit <= high
+    ):
+        stride = "" if period is None else f"with strides of {period / fps:.3g} s "
+        raise InputError(
+            f"{path}: at {fps:g} frames/s the body would move {stride}at {speed:.3g} "
+            "m/s, which is not plausible; give its true rate with --fps."
+        )
+
+
+def stride_of(points: Array, height: float, strides: int = 3) -> float | None:
+    """Returns the stride period in frames, None if there are fewer strides."""
+    spine = points[:, 0] - points[:, 1]
+    track = Track(
+        fps=1.0,
+        trunk=points[:, :2].mean(axis=1)[:, :2],
+        yaw=np.arctan2(spine[:, 1], spine[:, 0]),
+        soles=points[:, 2:],
+        stance_height=height,
+    )
+    if track.fore_aft.std(axis=0).max() < STILL * height:
+        return None
+    return stride_period(track, strides)
