@@ -1,9 +1,10 @@
 """The command ``data fetch``."""
 
 import re
-from collections.abc import Iterable, Sequence
+import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tyro
 from rich.console import Console
@@ -17,15 +18,9 @@ from rich.progress import (
 
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import InputError, check_choice
-from loco_drake.datasets.download import (
-    Outcome,
-    RemoteFile,
-    download_files,
-    files_by_source,
-    parse_mirror,
-)
-from loco_drake.datasets.registry import DATASETS, data_target
-from loco_drake.datasets.segments import add_shipped_rows, read_rows, write_rows
+
+if TYPE_CHECKING:
+    from loco_drake.datasets.download import RemoteFile
 
 # Parts of the names of Creative Commons licences, and what they ask.
 _CONDITIONS = {
@@ -65,7 +60,21 @@ class DataFetch:
             InputError: if an option is wrong, or the folder's segments.csv damaged.
             OSError: if the folder cannot be written to.
         """
-        files = self._files()
+        from loco_drake.datasets.download import (
+            download_files,
+            files_by_source,
+            parse_mirror,
+        )
+        from loco_drake.datasets.registry import DATASETS, data_target
+        from loco_drake.datasets.segments import (
+            add_shipped_rows,
+            read_rows,
+            write_rows,
+        )
+
+        files = files_by_source()
+        if wanted := [check_choice("source", s, files) for g in self.source for s in g]:
+            files = {source: files[source] for source in files if source in wanted}
         mirror = parse_mirror(self.mirror)
         folder = data_target(self.data_dir)
         if folder.exists() and not folder.is_dir():
@@ -77,47 +86,7 @@ class DataFetch:
             for source, listed in files.items()
         }
         _print_sources(files, missing)
-        outcomes = self._download(_flat(missing), folder, mirror)
-        failed = {outcome.file: outcome.error for outcome in outcomes if outcome.error}
-        present = [file.name for file in _flat(files) if file not in failed]
-        merged = add_shipped_rows(rows, present)
-        if merged != rows:
-            write_rows(table, merged)
-        write_json(
-            self.json,
-            {
-                source: {
-                    "files": len(listed),
-                    "bytes": sum(file.size for file in listed),
-                    "fetched": len([f for f in missing[source] if f not in failed]),
-                    "already_there": len(listed) - len(missing[source]),
-                    "failed": {f.name: failed[f] for f in listed if f in failed},
-                    "licence": DATASETS[source].licence,
-                    "attribution": DATASETS[source].attribution,
-                }
-                for source, listed in files.items()
-            },
-        )
-        fetched = len(outcomes) - len(failed)
-        console = Console(highlight=False, soft_wrap=True)
-        console.print(
-            f"{len(present)} files in {folder}: {fetched} fetched, "
-            f"{len(present) - fetched} already there",
-            markup=False,
-        )
-        _print_failures([outcome for outcome in outcomes if outcome.error])
-        return 1 if failed else 0
-
-    def _files(self) -> dict[str, list[RemoteFile]]:
-        files = files_by_source()
-        wanted = [
-            check_choice("source", s, files) for group in self.source for s in group
-        ]
-        return {s: listed for s, listed in files.items() if s in wanted or not wanted}
-
-    def _download(
-        self, files: Sequence[RemoteFile], folder: Path, mirror: str | Path | None
-    ) -> list[Outcome]:
+        to_fetch = [file for listed in missing.values() for file in listed]
         progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -127,21 +96,56 @@ class DataFetch:
             transient=True,
         )
         with progress:
-            task = progress.add_task("Fetching", total=sum(f.size for f in files))
-
-            def report(done: int) -> None:
-                progress.update(task, completed=done)
-
-            return list(download_files(files, folder, mirror, report))
-
-
-def _flat(files: dict[str, list[RemoteFile]]) -> list[RemoteFile]:
-    return [file for listed in files.values() for file in listed]
+            task = progress.add_task("Fetching", total=sum(f.size for f in to_fetch))
+            outcomes = download_files(
+                to_fetch,
+                folder,
+                mirror,
+                lambda done: progress.update(task, completed=done),
+            )
+            failed = {file.name: error for file, error in outcomes if error}
+        names = [file.name for listed in files.values() for file in listed]
+        present = [name for name in names if name not in failed]
+        merged = add_shipped_rows(rows, present)
+        if merged != rows:
+            write_rows(table, merged)
+        figures = {}
+        for source, listed in files.items():
+            lost = {f.name: failed[f.name] for f in listed if f.name in failed}
+            figures[source] = {
+                "files": len(listed),
+                "bytes": sum(file.size for file in listed),
+                "fetched": len(missing[source]) - len(lost),
+                "already_there": len(listed) - len(missing[source]),
+                "failed": lost,
+                "licence": DATASETS[source].licence,
+                "attribution": DATASETS[source].attribution,
+            }
+        write_json(self.json, figures)
+        fetched = len(to_fetch) - len(failed)
+        print(
+            f"{len(present)} files in {folder}: {fetched} fetched, "
+            f"{len(present) - fetched} already there"
+        )
+        for name, error in list(failed.items())[:_LISTED_FAILURES]:
+            print(f"Failed: {name} {error}", file=sys.stderr)
+        if len(failed) > _LISTED_FAILURES:
+            more = len(failed) - _LISTED_FAILURES
+            print(f"Failed: {more} more files", file=sys.stderr)
+        if failed:
+            again = "The same command again fetches only what is missing."
+            print(again, file=sys.stderr)
+        return 1 if failed else 0
 
 
 def _print_sources(
-    files: dict[str, list[RemoteFile]], missing: dict[str, list[RemoteFile]]
+    files: "dict[str, list[RemoteFile]]", missing: "dict[str, list[RemoteFile]]"
 ) -> None:
+    from loco_drake.datasets.registry import DATASETS
+
+    def megabytes(listed: "list[RemoteFile]") -> str:
+        return f"{sum(file.size for file in listed) / 1e6:.1f}"
+
     print_table(
         "Recordings, and whose they are",
         ["source", "files", "MB", "MB to fetch", "licence", "attribution"],
@@ -149,18 +153,17 @@ def _print_sources(
             [
                 source,
                 str(len(listed)),
-                _megabytes(listed),
-                _megabytes(missing[source]),
+                megabytes(listed),
+                megabytes(missing[source]),
                 DATASETS[source].licence,
                 DATASETS[source].attribution,
             ]
             for source, listed in files.items()
         ],
     )
-    console = Console(highlight=False, soft_wrap=True)
     for licence in dict.fromkeys(DATASETS[source].licence for source in files):
         if conditions := describe_licence(licence):
-            console.print(f"{licence}: {conditions}.", markup=False)
+            print(f"{licence}: {conditions}.")
 
 
 def describe_licence(licence: str) -> str:
@@ -169,19 +172,3 @@ def describe_licence(licence: str) -> str:
         return ""
     parts = re.findall(r"[A-Z]+", licence)
     return ", ".join(text for part, text in _CONDITIONS.items() if part in parts)
-
-
-def _print_failures(failed: Sequence[Outcome]) -> None:
-    if not failed:
-        return
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
-    for outcome in failed[:_LISTED_FAILURES]:
-        console.print(f"Failed: {outcome.file.name} {outcome.error}", markup=False)
-    more = len(failed) - _LISTED_FAILURES
-    if more > 0:
-        console.print(f"Failed: {more} more files")
-    console.print("The same command again fetches only what is missing.")
-
-
-def _megabytes(files: Iterable[RemoteFile]) -> str:
-    return f"{sum(file.size for file in files) / 1e6:.1f}"

@@ -3,7 +3,7 @@
 import csv
 import io
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,8 +17,7 @@ from loco_drake.datasets.registry import DATASETS
 from loco_drake.datasets.text import is_inside, read_text
 
 MANIFEST = Path(__file__).with_name("manifest.csv")
-
-# What each column of a manifest holds.
+# What each column of a manifest holds, beside the names of the file here and there.
 _COLUMNS = {
     "repository": r"[\w.-]+/[\w.-]+",
     "commit": "[0-9a-f]{40}",
@@ -27,7 +26,7 @@ _COLUMNS = {
 }
 # Without a connection every file would wait for its timeout: so many in a row suffice.
 LOST_CONNECTIONS = 3
-CHUNK = 2**16
+_CHUNK = 2**16
 
 pooch.get_logger().setLevel("ERROR")
 
@@ -37,33 +36,16 @@ class RemoteFile:
     """One file of a recording as its authors, or others, published it.
 
     Attributes:
-        name: its path inside the data folder, with ``/``.
-        repository: ``owner/name`` on GitHub.
-        commit: the commit in which it has the content that ``sha256`` describes.
-        path: its path inside the repository.
+        name: its path inside the data folder, with ``/``; begins with the dataset's.
+        url: address of the content, which no later commit can change.
         size: bytes.
         sha256: checksum of the content, in hexadecimal.
     """
 
     name: str
-    repository: str
-    commit: str
-    path: str
+    url: str
     size: int
     sha256: str
-
-    @property
-    def folder(self) -> str:
-        """The dataset's folder, the first part of the name."""
-        return self.name.split("/")[0]
-
-    @property
-    def url(self) -> str:
-        """Address of the content, which no later commit can change."""
-        return (
-            f"https://raw.githubusercontent.com/{self.repository}/{self.commit}/"
-            f"{quote(self.path)}"
-        )
 
     def is_present(self, folder: Path) -> bool:
         """Says whether the data folder has the file with the right content."""
@@ -75,19 +57,6 @@ class RemoteFile:
         )
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What became of one file.
-
-    Attributes:
-        file: the file.
-        error: why it could not be had, as the end of a sentence; None if it is there.
-    """
-
-    file: RemoteFile
-    error: str | None = None
-
-
 def read_manifest(path: Path) -> list[RemoteFile]:
     """Returns the files listed in a manifest, in its order.
 
@@ -96,41 +65,39 @@ def read_manifest(path: Path) -> list[RemoteFile]:
             folder, or one that another line names, too.
     """
     files: dict[str, RemoteFile] = {}
-    reader = csv.DictReader(io.StringIO(read_text(path, "a manifest"), newline=""))
+    reader = csv.reader(io.StringIO(read_text(path, "a manifest"), newline=""))
     try:
-        for row in reader:
-            cells = {k: v or "" for k, v in row.items() if k is not None}
-            right = all(is_inside(cells.get(name, "")) for name in ("file", "path"))
-            for name, pattern in _COLUMNS.items():
-                right &= (
-                    re.fullmatch(pattern, cells.get(name, ""), re.ASCII) is not None
-                )
-            if not right or None in row or cells["file"] in files:
-                raise csv.Error
-            files[cells["file"]] = RemoteFile(
-                name=cells["file"],
-                repository=cells["repository"],
-                commit=cells["commit"],
-                path=cells["path"],
-                size=int(cells["bytes"]),
-                sha256=cells["sha256"],
+        header = next(reader, [])
+        for cells in reader:
+            row = dict(zip(header, cells, strict=True))
+            if row["file"] in files or not (
+                is_inside(row["file"])
+                and is_inside(row["path"])
+                and all(re.fullmatch(_COLUMNS[name], row[name]) for name in _COLUMNS)
+            ):
+                raise ValueError
+            files[row["file"]] = RemoteFile(
+                name=row["file"],
+                url="https://raw.githubusercontent.com/"
+                f"{row['repository']}/{row['commit']}/{quote(row['path'])}",
+                size=int(row["bytes"]),
+                sha256=row["sha256"],
             )
-    except csv.Error:
+    except (csv.Error, LookupError, ValueError):
         raise InputError(
-            f"{path}: line {reader.line_num} is no entry of a manifest, or is not for "
-            "it alone."
+            f"{path}: line {reader.line_num} is damaged, or names a file a second time "
+            "or outside the data folder."
         ) from None
     return list(files.values())
 
 
 def files_by_source() -> dict[str, list[RemoteFile]]:
     """Returns the shipped manifest's files of each source that can be read."""
-    files = read_manifest(MANIFEST)
-    found = {
-        source: [file for file in files if file.folder == dataset.folder]
-        for source, dataset in DATASETS.items()
-    }
-    return {source: listed for source, listed in found.items() if listed}
+    found: dict[str, list[RemoteFile]] = {source: [] for source in DATASETS}
+    sources = {dataset.folder: source for source, dataset in DATASETS.items()}
+    for file in read_manifest(MANIFEST):
+        found.get(sources.get(file.name.split("/")[0], ""), []).append(file)
+    return {source: files for source, files in found.items() if files}
 
 
 def parse_mirror(text: str | None) -> str | Path | None:
@@ -141,25 +108,22 @@ def parse_mirror(text: str | None) -> str | Path | None:
     Raises:
         InputError: if it is neither an http(s) address nor a folder.
     """
-    if text is None:
-        return None
-    if text.startswith(("http://", "https://")):
-        return text.rstrip("/")
-    folder = Path(text)
-    if not folder.is_dir():
+    if text is None or text.startswith(("http://", "https://")):
+        return text and text.rstrip("/")
+    if not Path(text).is_dir():
         raise InputError(
             f"There is no mirror folder {text!r}: --mirror takes a folder, or an "
             "address that starts with http:// or https://."
         )
-    return folder
+    return Path(text)
 
 
 def download_files(
-    files: Iterable[RemoteFile],
+    files: Sequence[RemoteFile],
     folder: Path,
     mirror: str | Path | None = None,
     report: Callable[[int], object] = lambda done: None,
-) -> Iterator[Outcome]:
+) -> Iterator[tuple[RemoteFile, str | None]]:
     """Fetches files, replacing those in the way, and yields what became of each.
 
     A file arrives whole and checked, or not at all, and one that fails does not stop
@@ -172,22 +136,20 @@ def download_files(
         mirror: what :func:`parse_mirror` returns; None for the public origin.
         report: is told the bytes done so far, a failed file's included.
 
+    Yields:
+        Each file, and why it could not be had as the end of a sentence, or None.
+
     Raises:
         OSError: if the data folder cannot be written to.
     """
-    files = list(files)
     urls = {
         file.name: file.url
         if mirror is None
         else f"{mirror}/{quote(file.name) if isinstance(mirror, str) else file.name}"
         for file in files
     }
-    keeper = pooch.create(
-        path=folder,
-        base_url="",
-        registry={file.name: file.sha256 for file in files},
-        urls=urls,
-    )
+    hashes = {file.name: file.sha256 for file in files}
+    keeper = pooch.create(path=folder, base_url="", registry=hashes, urls=urls)
     fetch = _copy if isinstance(mirror, Path) else _get
     done = lost = 0
     for file in files:
@@ -195,16 +157,17 @@ def download_files(
         if lost < LOST_CONNECTIONS:
             meter = _Meter(file.size, done, report)
             try:
-                _check_target(file, folder)
+                if not (folder / file.name).resolve().is_relative_to(folder.resolve()):
+                    raise _DownloadError("is led out of the data folder by a link")
                 keeper.fetch(file.name, downloader=partial(fetch, meter=meter))
                 lost, error = 0, None
             except _ConnectionLostError as failed:
                 lost, error = lost + 1, str(failed)
             except _DownloadError as failed:
                 lost, error = 0, str(failed)
-            except ValueError:
+            except ValueError:  # of pooch
                 lost, error = 0, "has another SHA-256 than the manifest says"
-        yield Outcome(file, error)
+        yield file, error
         done += file.size
         report(done)
 
@@ -217,27 +180,19 @@ class _ConnectionLostError(_DownloadError):
     """The server cannot be reached, so that other files will fare no better."""
 
 
-def _check_target(file: RemoteFile, folder: Path) -> None:
-    """Raises _DownloadError if a link leads the file out of the data folder."""
-    if not (folder / file.name).resolve().is_relative_to(folder.resolve()):
-        raise _DownloadError("would lie outside the data folder, where a link leads")
-
-
 def _copy(source: str, target: str, _: object, *, meter: "_Meter") -> None:
     try:
         if Path(source).stat().st_size != meter.size:
             raise _DownloadError("has another size than the manifest says")
-        with open(source, "rb") as original:
-            content = original.read()
+        content = Path(source).read_bytes()
     except OSError as error:
-        raise _DownloadError(
-            f"cannot be read from the mirror: {error.strerror}"
-        ) from None
+        reason = f"cannot be read from the mirror: {error.strerror}"
+        raise _DownloadError(reason) from None
     _renew(target).write_bytes(content)
 
 
 def _get(url: str, target: str, _: object, *, meter: "_Meter") -> None:
-    download = pooch.HTTPDownloader(progressbar=meter, chunk_size=CHUNK)
+    download = pooch.HTTPDownloader(progressbar=meter, chunk_size=_CHUNK)
     try:
         download(url, str(_renew(target)), None)
     except requests.HTTPError as error:
@@ -264,14 +219,12 @@ class _Meter:
 
     def __init__(self, size: int, before: int, report: Callable[[int], object]) -> None:
         self.size = self.total = size
-        self._before = before
-        self._report = report
-        self._done = 0
+        self._before, self._done, self._report = before, 0, report
 
     def update(self, count: int) -> None:
         self._done += count
         # Pooch counts whole chunks, also for the last one, which is shorter.
-        if self._done > self.size + CHUNK:
+        if self._done > self.size + _CHUNK:
             raise _DownloadError("is longer than the manifest says")
         self._report(self._before + min(self._done, self.size))
 

@@ -13,7 +13,7 @@ from loco_drake.common.files import atomic_path
 from loco_drake.datasets.recording import check_rate
 from loco_drake.datasets.registry import DATASETS, read_clip
 from loco_drake.datasets.text import is_inside, read_text
-from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.gaits import LABELS, GaitLabel
 from loco_drake.motion.keypoints import KeypointClip
 
 SHIPPED = Path(__file__).with_name("segments.csv")
@@ -23,8 +23,6 @@ Row = dict[str, str]
 
 # Horse<animal>_M<day of measurement>_<gait><number>...
 _HORSE = re.compile(r"(Horse\d+)_M\d+_")
-# Gaits are parts of the names of files.
-_GAIT = re.compile(r"\w{1,40}")
 
 
 @dataclass(frozen=True)
@@ -51,11 +49,7 @@ class Segment:
     fps: float
 
     def __post_init__(self) -> None:
-        if not _GAIT.fullmatch(self.gait):
-            raise InputError(
-                "The name of a gait has up to 40 letters, digits and underscores, and "
-                "nothing else."
-            )
+        GaitLabel(self.source, self.gait)  # checks the names
         if not 0 <= self.start < self.end:
             raise InputError(f"Frames {self.start} to {self.end} are no stretch.")
         check_rate(self.fps, "The stretch")

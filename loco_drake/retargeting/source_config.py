@@ -4,8 +4,9 @@ from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
 
-from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.errors import InputError
 from loco_drake.common.typed_yaml import read_yaml
+from loco_drake.datasets.registry import get_dataset
 
 _FOLDER = Path(__file__).parent / "sources"
 
@@ -63,13 +64,17 @@ class RetargetConfig:
 
 
 def load_config(source: str) -> RetargetConfig:
-    """Returns the configuration that is shipped for ``source``.
+    """Returns the configuration of a source: its dataset's, or the shipped one.
+
+    A dataset that has neither gets the defaults.
 
     Raises:
-        InputError: naming the sources that have one.
+        InputError: naming the sources that there are.
     """
-    shipped = sorted(path.stem for path in _FOLDER.glob("*.yaml"))
-    return read_config(_FOLDER / f"{check_choice('source', source, shipped)}.yaml")
+    own, shipped = get_dataset(source).config, _FOLDER / f"{source}.yaml"
+    if own is None and not shipped.is_file():
+        return RetargetConfig()
+    return read_config(own or shipped)
 
 
 def read_config(path: Path) -> RetargetConfig:

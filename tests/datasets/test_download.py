@@ -35,9 +35,7 @@ def files():
     return [
         RemoteFile(
             name=name,
-            repository="owner/name",
-            commit="0" * 40,
-            path=name,
+            url=f"http://origin.invalid/{name}",
             size=len(content),
             sha256=hashlib.sha256(content).hexdigest(),
         )
@@ -48,8 +46,8 @@ def files():
 def fetch(files, folder, mirror, report=lambda done: None):
     """What went wrong with each file that failed."""
     outcomes = list(download_files(files, folder, mirror, report))
-    assert [outcome.file for outcome in outcomes] == files
-    return {o.file.name: o.error for o in outcomes if o.error is not None}
+    assert [file for file, _ in outcomes] == files
+    return {file.name: error for file, error in outcomes if error is not None}
 
 
 def content_of(folder):
