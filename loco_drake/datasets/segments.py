@@ -126,10 +126,10 @@ def _numbered_rows(table: Path) -> Iterator[tuple[int, Row]]:
     reader = csv.DictReader(
         io.StringIO(text, newline=""), delimiter=";" if "," not in header else ","
     )
-    names = [name.strip().lower() for name in reader.fieldnames or ()]
-    if lacking := [name for name in COLUMNS if name not in names]:
-        raise InputError(f"{table}: line 1 lacks {', '.join(lacking)}.")
     try:
+        names = [name.strip().lower() for name in reader.fieldnames or ()]
+        if lacking := [name for name in COLUMNS if name not in names]:
+            raise InputError(f"{table}: line 1 lacks {', '.join(lacking)}.")
         for cells in reader:
             line = reader.line_num
             if None in cells:
@@ -137,10 +137,11 @@ def _numbered_rows(table: Path) -> Iterator[tuple[int, Row]]:
                     f"{table}: line {line} has more cells than the header."
                 )
             row = {k.strip().lower(): (v or "").strip() for k, v in cells.items()}
-            missing = [name for name in COLUMNS if not row.get(name)]
-            if any(row.values()) and missing:
-                raise InputError(f"{table}: line {line} lacks {', '.join(missing)}.")
-            if not missing:
+            if any(row.values()):
+                if missing := [name for name in COLUMNS if not row[name]]:
+                    raise InputError(
+                        f"{table}: line {line} lacks {', '.join(missing)}."
+                    )
                 yield line, row
     except csv.Error:
         raise InputError(
