@@ -2,43 +2,42 @@
 
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import Progress
 
-from loco_drake.cli.output import print_figures, write_json
+from loco_drake.cli.evaluation import Evaluation
+from loco_drake.cli.output import print_figures
 from loco_drake.common.errors import check_at_least, check_choice
-from loco_drake.control.actor import load_actor
-from loco_drake.datasets.registry import data_dir
-from loco_drake.datasets.segments import read_segments
-from loco_drake.evaluation.tracking_table import (
-    Trial,
-    generated_trials,
-    retargeted_trials,
-    run_trials,
-    summarize,
-)
-from loco_drake.generation.generate import check_duration
-from loco_drake.models.plant import PlantConfig
-from loco_drake.models.robots import ROBOTS, get_robot
-from loco_drake.models.shipped import policy_path
 from loco_drake.motion.gaits import parse_label
-from loco_drake.systems.scenario import (
-    GeneratedReference,
-    PlanReference,
-    Scenario,
-    TrainedPolicy,
-)
 from loco_drake.tracking.randomization import RandomizationConfig
+
+if TYPE_CHECKING:
+    from loco_drake.evaluation.tracking_table import Trial
+    from loco_drake.systems.scenario import Scenario
+
+# Title: key, factor, digits.
+_COLUMNS = {
+    "return": ("normalized_return", 1, 1),
+    "worst": ("normalized_return_worst", 1, 1),
+    "falls %": ("fall_rate", 100, 0),
+    "joints rad": ("joint_rmse_rad", 1, 3),
+    "base m": ("base_position_rmse_m", 1, 3),
+    "base rad": ("base_orientation_rmse_rad", 1, 3),
+    "slip m/s": ("stance_slip_median_mps", 1, 3),
+    "stretch": ("stretch", 1, 3),
+    "m/s": ("speed_mps", 1, 2),
+    "torque limit %": ("torque_saturation", 100, 1),
+    "transport": ("cost_of_transport", 1, 2),
+    "episodes": ("episodes", 1, 0),
+}
 
 
 @dataclass(kw_only=True)
-class EvaluateTracking:
+class EvaluateTracking(Evaluation):
     """Simulates many episodes and says how well the policy follows its references."""
 
-    robot: str = "go2"
-    """The robot: go2, a1 or all."""
     labels: tuple[str, ...] = ()
     """Such as dog-trot dog-pace. Default: those that the policy was trained on."""
     reference: str = "generated"
@@ -70,61 +69,54 @@ class EvaluateTracking:
     """Draw the world of each episode, as in training with --randomize."""
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
     """Single parts of it; a range is two numbers."""
-    data_dir: Path | None = None
-    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
-    workers: int = 1
-    """Processes."""
     seed: int = 0
     """Of the first generated reference of each label."""
-    json: Path | None = None
-    """Writes the figures to this file."""
 
-    def run(self) -> int:
-        """Simulates, prints a table for each robot and writes; returns 0.
+    def check(self) -> None:
+        """Raises InputError if an option is wrong."""
+        from loco_drake.generation.generate import check_duration
 
-        Raises:
-            InputError: if an option is wrong, or a robot has no weights.
-        """
-        check_choice("robot", self.robot, (*ROBOTS, "all"))
         check_choice("reference", self.reference, ("generated", "retargeted"))
         check_duration(self.duration)
         check_at_least("seeds", self.seeds, 1)
-        check_at_least("workers", self.workers, 1)
-        randomization = self._randomization()
-        names = list(ROBOTS) if self.robot == "all" else [self.robot]
-        plans = {name: self._plan(name) for name in names}
-        results = {
-            name: self._evaluate(name, *plan, randomization)
-            for name, plan in plans.items()
-        }
-        whole = results.get(self.robot, {"robots": results})
-        write_json(self.json, whole)
-        for name, result in results.items():
-            world = "" if randomization.is_off else ", randomized"
-            title = (
-                f"{name}, {self.reference}, {self.contact}{world}: "
-                f"{result['real_time_factor']:.1f} times real time"
-            )
-            rows = {**result["labels"], "all of these": result["all"]}
-            print_figures(title, "label", _COLUMNS, rows)
-        return 0
-
-    def _randomization(self) -> RandomizationConfig:
-        """Returns what the worlds are drawn from."""
-        result = self.randomization
         if self.pushes:
-            result = replace(
-                result,
+            self.randomization = replace(
+                self.randomization,
                 push=(self.push_size, self.push_size),
                 push_interval=(self.push_interval, self.push_interval),
             )
         if self.randomize:
-            result = result.with_standard()
-        result.check()
-        return result
+            self.randomization = self.randomization.with_standard()
+        self.randomization.check()
 
-    def _plan(self, name: str) -> tuple[Scenario, list[Trial]]:
+    def of_robots(self, names: list[str]) -> dict[str, Any]:
+        """Returns the figures of one robot, or of all by name.
+
+        Nothing is simulated before it is known that everything can be.
+        """
+        trials = {name: self._trials(name) for name in names}
+        results = {name: self._evaluate(name, *trials[name]) for name in names}
+        return results.get(self.robot, {"robots": results})
+
+    def _trials(self, name: str) -> "tuple[Scenario, list[Trial]]":
         """Returns what to simulate for a robot."""
+        from loco_drake.control.actor import load_actor
+        from loco_drake.datasets.registry import data_dir
+        from loco_drake.datasets.segments import read_segments
+        from loco_drake.evaluation.tracking_table import (
+            generated_trials,
+            retargeted_trials,
+        )
+        from loco_drake.models.plant import PlantConfig
+        from loco_drake.models.robots import get_robot
+        from loco_drake.models.shipped import policy_path
+        from loco_drake.systems.scenario import (
+            GeneratedReference,
+            PlanReference,
+            Scenario,
+            TrainedPolicy,
+        )
+
         robot = get_robot(name)
         weights = policy_path(robot, self.policy)
         trained = load_actor(weights, robot).config.labels
@@ -150,44 +142,35 @@ class EvaluateTracking:
         return scenario, generated_trials(labels, seeds, self.duration)
 
     def _evaluate(
-        self,
-        name: str,
-        scenario: Scenario,
-        trials: list[Trial],
-        randomization: RandomizationConfig,
+        self, name: str, scenario: "Scenario", trials: "list[Trial]"
     ) -> dict[str, Any]:
+        from loco_drake.evaluation.tracking_table import run_trials, summarize
+
         with Progress(console=Console(stderr=True), transient=True) as progress:
             episodes = list(
                 progress.track(
-                    run_trials(scenario, trials, self.workers, randomization),
+                    run_trials(scenario, trials, self.workers, self.randomization),
                     total=len(trials),
                     description=f"Simulating {name}",
                 )
             )
-        conditions = {
+        return {
             "robot": name,
             "reference": self.reference,
             "contact": self.contact,
             "time_step_s": self.time_step,
             "friction": self.friction,
             "duration_s": self.duration,
-            "randomization": asdict(randomization),
+            "randomization": asdict(self.randomization),
+            **summarize(episodes),
         }
-        return {**conditions, **summarize(episodes)}
 
-
-# Title: key, factor, digits.
-_COLUMNS = {
-    "return": ("normalized_return", 1, 1),
-    "worst": ("normalized_return_worst", 1, 1),
-    "falls %": ("fall_rate", 100, 0),
-    "joints rad": ("joint_rmse_rad", 1, 3),
-    "base m": ("base_position_rmse_m", 1, 3),
-    "base rad": ("base_orientation_rmse_rad", 1, 3),
-    "slip m/s": ("stance_slip_median_mps", 1, 3),
-    "stretch": ("stretch", 1, 3),
-    "m/s": ("speed_mps", 1, 2),
-    "torque limit %": ("torque_saturation", 100, 1),
-    "transport": ("cost_of_transport", 1, 2),
-    "episodes": ("episodes", 1, 0),
-}
+    def show(self, name: str, figures: dict[str, Any]) -> None:
+        """Prints a table of all labels."""
+        world = "" if self.randomization.is_off else ", randomized"
+        title = (
+            f"{name}, {self.reference}, {self.contact}{world}: "
+            f"{figures['real_time_factor']:.1f} times real time"
+        )
+        rows = {**figures["labels"], "all of these": figures["all"]}
+        print_figures(title, "label", _COLUMNS, rows)

@@ -1,55 +1,129 @@
 """What the ``evaluate`` commands share."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from loco_drake.common.errors import InputError, check_choice
+from rich.console import Console
+
+from loco_drake.cli.output import write_json
+from loco_drake.common.errors import InputError, check_at_least, check_choice
 from loco_drake.common.files import atomic_path
+from loco_drake.motion.gaits import parse_label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from loco_drake.evaluation.recorded import Recorded
 
-def of_robots(
-    robot: str, evaluate: Callable[[str], dict[str, Any]], keys: Iterable[str]
-) -> dict[str, Any]:
-    """Returns the figures of ``robot``, or of all by name.
 
-    With "all", the figures of a robot that cannot be evaluated are null, and its
-    "reason" says why; if none can, that is an error.
+@dataclass(kw_only=True)
+class Evaluation:
+    """An evaluation of the two robots; KEYS are those of a robot's figures."""
+
+    KEYS: ClassVar[tuple[str, ...]]
+
+    robot: str = "go2"
+    """The robot: go2, a1 or all."""
+    labels: tuple[str, ...] = ()
+    """Such as dog-trot dog-pace. Default: the fifteen, as far as there are recordings
+    of them."""
+    data_dir: Path | None = None
+    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
+    workers: int = 1
+    """Processes."""
+    seed: int = 0
+    """As in every command."""
+    json: Path | None = None
+    """Writes the figures to this file."""
+
+    def run(self) -> int:
+        """Prints tables for each robot and writes the figures; returns 0.
+
+        Raises:
+            InputError: if an option is wrong, or there is nothing to evaluate.
+        """
+        from loco_drake.models.robots import ROBOTS
+
+        check_choice("robot", self.robot, (*ROBOTS, "all"))
+        check_at_least("workers", self.workers, 1)
+        check_at_least("seed", self.seed, 0)
+        for label in self.labels:
+            parse_label(label)
+        self.check()
+        result = self.of_robots(list(ROBOTS) if self.robot == "all" else [self.robot])
+        write_json(self.json, result)
+        for name, figures in result.get("robots", {self.robot: result}).items():
+            self.show(name, figures)
+        return 0
+
+    def check(self) -> None:
+        """Raises InputError if an option of this command is wrong."""
+
+    def of_robots(self, names: list[str]) -> dict[str, Any]:
+        """Returns the figures of one robot, or of all by name.
+
+        Of several, the figures of a robot that cannot be evaluated are null, and its
+        "reason" says why; if none can, that is an error.
+        """
+        if len(names) == 1:
+            return {"robot": names[0], **self.of_robot(names[0])}
+        results: dict[str, dict[str, Any]] = {}
+        errors = []
+        for name in names:
+            try:
+                results[name] = self.of_robot(name)
+            except InputError as error:
+                errors.append(error)
+                results[name] = {**dict.fromkeys(self.KEYS), "reason": str(error)}
+        if len(errors) == len(names):
+            raise errors[0]
+        return {"robots": results}
+
+    def of_robot(self, name: str) -> dict[str, Any]:
+        """Returns the figures of one robot."""
+        raise NotImplementedError
+
+    def show(self, name: str, figures: dict[str, Any]) -> None:
+        """Prints what :meth:`of_robot` returned."""
+        raise NotImplementedError
+
+
+def say_of(robot: str) -> Callable[[str], None]:
+    """Returns what prints on stderr what goes on with a robot."""
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    return lambda text: console.print(f"{robot}: {text}", markup=False)
+
+
+def trained_on(
+    paths: Mapping[str, Path], recorded: "Recorded", robot: str
+) -> dict[str, list[str] | None]:
+    """Returns which recordings of validation weights were trained on; warns of them.
 
     Args:
-        robot: a name, or "all".
-        evaluate: returns the figures of one robot.
-        keys: of the figures.
+        paths: weights by kind, "tokenizer" or "generator".
+        recorded: retargeted recordings.
+        robot: named in the warning.
 
-    Raises:
-        InputError: from ``evaluate``.
+    Returns:
+        Names of subjects by kind; None where the weights do not say.
     """
-    from loco_drake.models.robots import ROBOTS
+    from loco_drake.generation.training_record import (
+        read_training_record,
+        seen_in_training,
+    )
 
-    check_choice("robot", robot, (*ROBOTS, "all"))
-    if robot != "all":
-        return {"robot": robot, **evaluate(robot)}
-    results: dict[str, dict[str, Any]] = {}
-    errors = []
-    for name in ROBOTS:
-        try:
-            results[name] = evaluate(name)
-        except InputError as error:
-            errors.append(error)
-            results[name] = {**dict.fromkeys(keys), "reason": str(error)}
-    if len(errors) == len(ROBOTS):
-        raise errors[0]
-    return {"robots": results}
-
-
-def robot_names(result: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    """Returns name and figures of each robot in what :func:`of_robots` returns."""
-    if "robots" in result:
-        return list(result["robots"].items())
-    return [(result["robot"], result)]
+    result = {}
+    for kind, path in paths.items():
+        record = read_training_record(path, kind)
+        seen = result[kind] = seen_in_training(record, recorded.validation)
+        if seen is None:
+            say_of(robot)(f"What the {kind} was trained on is not recorded in {path}.")
+        elif seen:
+            text = f"The {kind} was trained on recordings of validation: "
+            say_of(robot)(f"Warning: {text}{', '.join(seen)}.")
+    return result
 
 
 def estimate_text(estimate: dict[str, float] | None) -> str:

@@ -8,9 +8,6 @@ from rich.console import Console
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.common.files import atomic_path
-from loco_drake.evaluation.report.page import build_report
-from loco_drake.evaluation.report.results import results_dir
-from loco_drake.generation.generate import check_duration
 
 DEFAULT_REPLAYS = ("dog-trot", "horse-trot", "mpc-bound", "solo8-walk")
 
@@ -42,6 +39,10 @@ class Report:
         Raises:
             InputError: if an option or a result is wrong; nothing is written then.
         """
+        from loco_drake.evaluation.report.page import build_report
+        from loco_drake.evaluation.report.results import results_dir
+        from loco_drake.generation.generate import check_duration
+
         check_at_least("seed", self.seed, 0)
         check_duration(self.replay_seconds)
         labels = () if self.replays == ("none",) else self.replays

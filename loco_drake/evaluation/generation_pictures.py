@@ -1,6 +1,6 @@
 """Pictures of what tokenizer and generator do."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,6 +15,7 @@ from loco_drake.common.rotations import (
     yaw_quat,
 )
 from loco_drake.evaluation.recognition import Recognition
+from loco_drake.evaluation.recorded import Recorded
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import Motion
@@ -30,6 +31,21 @@ _TITLES = {
     "real_to_generated": "generated, by recordings",
     "generated_to_real": "recordings, by generated",
 }
+
+
+def generation_figures(
+    robot: Robot,
+    recorded: Recorded,
+    generated: Sequence[Motion],
+    recognition: Mapping[str, Recognition],
+) -> dict[str, Figure]:
+    """Returns all pictures of ``evaluate generation``, by name."""
+    figures = {
+        f"confusion-{kind}": confusion_figure(found, f"{robot.name}, {kind}")
+        for kind, found in recognition.items()
+    }
+    real = (*recorded.validation, *recorded.train)
+    return {**figures, "motion": motion_figure(robot, real, generated)}
 
 
 def confusion_figure(recognition: Recognition, title: str) -> Figure:

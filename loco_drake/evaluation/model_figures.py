@@ -5,10 +5,10 @@ What cannot be measured is null, and ``reason`` says why.
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from loco_drake.common.errors import InputError
 from loco_drake.evaluation import drift as drifting
+from loco_drake.evaluation.effort import Effort
 from loco_drake.evaluation.generation import (
     Generated,
     GenerationScore,
@@ -30,43 +30,22 @@ NOT_TRAINED = "The generator was not trained on this label."
 ONLY_FILES = "Motion files were scored, not a generator."
 
 
-@dataclass(frozen=True)
-class Effort:
-    """How much is generated and trained.
-
-    Attributes:
-        count: trajectories of each label in a set.
-        sets: sets of trajectories; all motions differ in their seeds.
-        minutes: motions of a minute for each label; fewer than 2 measure no drift.
-        seeds: of the classifiers.
-        steps: of the transformer's training.
-        seed: of the first motion.
-    """
-
-    count: int
-    sets: int
-    minutes: int
-    seeds: tuple[int, ...]
-    steps: int
-    seed: int
-
-
 def generate_for_scoring(
-    model: MotionModel, labels: Sequence[GaitLabel], effort: Effort
+    model: MotionModel, labels: Sequence[GaitLabel], effort: Effort, seed: int
 ) -> Generated:
     """Generates what :func:`score_generation` scores, of labels that it knows."""
-    sets: list[list[Motion]] = [[] for _ in range(effort.sets)]
+    sets: list[list[Motion]] = [[] for _ in range(effort.generator_seeds)]
     long = {}
     for label in labels:
         for number, motions in enumerate(sets):
-            first = effort.seed + number * effort.count
+            first = seed + number * effort.count
             # A motion of 2 s ends with one frame more than 2 s of frames.
             made = generate_motions(
                 model, label, SECONDS, range(first, first + effort.count)
             )
             motions += [motion.slice(0, FRAMES) for motion in made]
         if effort.minutes > 1:
-            seeds = range(effort.seed, effort.seed + effort.minutes)
+            seeds = range(seed, seed + effort.minutes)
             long[str(label)] = generate_motions(model, label, drifting.SECONDS, seeds)
     return Generated(tuple(map(tuple, sets)), long)
 
@@ -77,6 +56,7 @@ def score_model(
     recorded: Recorded,
     other_robot: Recorded | None,
     effort: Effort,
+    seed: int,
     say: Callable[[str], None],
 ) -> tuple[GenerationScore, Generated]:
     """Returns the figures of a motion model, and the motion that they are of.
@@ -88,6 +68,7 @@ def score_model(
         other_robot: the same recordings retargeted to the other robot, if the
             tokenizer knows it.
         effort: how much to generate.
+        seed: of the first motion, and of the first classifier.
         say: is told what goes on.
 
     Raises:
@@ -101,12 +82,14 @@ def score_model(
             f"it was on {', '.join(trained)}."
         )
     say(f"Generating {', '.join(known)}")
-    generated = generate_for_scoring(model, [parse_label(k) for k in known], effort)
+    generated = generate_for_scoring(
+        model, [parse_label(k) for k in known], effort, seed
+    )
     score = score_generation(
         model.robot,
         recorded,
         generated,
-        seeds=effort.seeds,
+        seeds=range(seed, seed + effort.seeds),
         steps=effort.steps,
         say=say,
     )
@@ -134,6 +117,7 @@ def score_motions(
     motions: Sequence[Motion],
     recorded: Recorded,
     effort: Effort,
+    seed: int,
     say: Callable[[str], None],
 ) -> tuple[GenerationScore, Generated]:
     """Returns the figures of motions from anywhere, and their trajectories.
@@ -152,7 +136,12 @@ def score_motions(
             long.setdefault(str(motion.label), []).append(motion)
     generated = Generated((tuple(cuts),), long)
     score = score_generation(
-        robot, recorded, generated, seeds=effort.seeds, steps=effort.steps, say=say
+        robot,
+        recorded,
+        generated,
+        seeds=range(seed, seed + effort.seeds),
+        steps=effort.steps,
+        say=say,
     )
     figures = score.figures
     if figures["drift_60s"] is None:

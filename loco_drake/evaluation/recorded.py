@@ -1,6 +1,6 @@
 """Recorded motion of a robot, on the two sides of the split, to compare with."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,7 @@ from loco_drake.datasets.split import VALIDATION, Split
 from loco_drake.evaluation.samples import FRAMES
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.motion.gaits import LABELS
-from loco_drake.motion.motion import Motion
+from loco_drake.motion.motion import FPS, Motion
 from loco_drake.motion.motion_file import load_motion
 from loco_drake.retargeting.batch import SegmentRetargeter
 
@@ -97,6 +97,33 @@ def by_split(
         validation=tuple(m for m, out in zip(motions, held, strict=True) if out),
         failed=failed or {},
     )
+
+
+def load_to_score(
+    folder: Path, robot: Robot, labels: Collection[str] = ()
+) -> list[Motion]:
+    """Reads the Motion files of a robot under ``folder``, of all or of these labels.
+
+    Raises:
+        InputError: if there are none, or one is unsound or at another rate than FPS.
+    """
+    motions = [
+        motion
+        for motion in map(load_motion, sorted(folder.rglob("*.npz")))
+        if motion.robot == robot.name and (not labels or str(motion.label) in labels)
+    ]
+    if not motions:
+        raise InputError(
+            f"There are no Motion files (*.npz) of {robot.name} to score in "
+            f"{str(folder)!r}."
+        )
+    for motion in motions:
+        if motion.fps != FPS:
+            raise InputError(
+                f"Motions to score must be at {FPS:g} frames/s, one of "
+                f"{motion.label} is at {motion.fps:g}."
+            )
+    return motions
 
 
 def load_recorded(folder: Path) -> tuple[Robot, Recorded]:

@@ -4,7 +4,6 @@ Whatever is read of them is checked. A file that holds anything else than it sho
 damaged, which one sentence says.
 """
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError
+from loco_drake.common.files import read_json
 from loco_drake.evaluation.report.content import CONTENT
 from loco_drake.models.robots import ROBOTS
 from loco_drake.models.shipped import pretrained_dir
@@ -238,17 +238,6 @@ def load_results(folder: Path) -> Results:
             f"{names}."
         )
     return Results(folder, found, missing, absent)
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Returns the JSON object in a file."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path} is damaged: it is no JSON ({error}).") from None
-    if not isinstance(content, dict):
-        raise InputError(f"{path} is damaged: it holds no JSON object.")
-    return content
 
 
 def _by_robot(path: Path, file: ResultFile) -> dict[str, Figures]:
