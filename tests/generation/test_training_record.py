@@ -1,8 +1,8 @@
 import pytest
 
+from loco_drake.cli.evaluation import trained_on
 from loco_drake.cli.train_generator import TrainGenerator
 from loco_drake.cli.train_tokenizer import TrainTokenizer
-from loco_drake.cli.trained_on import trained_on
 from loco_drake.evaluation.recorded import by_split
 from loco_drake.generation.tokenizer import load_tokenizer, save_tokenizer
 from loco_drake.generation.training_record import (
