@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import Progress
 
-from loco_drake.cli.output import print_failed, print_figures, write_json
+from loco_drake.cli.output import print_failed, print_figures, write_results
 from loco_drake.common.errors import check_at_least, check_choice
 from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments, select_labels
@@ -66,7 +66,7 @@ class EvaluateRetargeting:
                     scores, total=len(segments), description=f"Retargeting to {name}"
                 )
                 robots[name] = summarize(list(tracked))
-        write_json(self.json, {"robots": robots, **asdict(variant)})
+        write_results(self.json, {"robots": robots, **asdict(variant)})
         for name, result in robots.items():
             speed = result["frames_per_second"] or 0.0
             title = f"{name}: {speed:.0f} frames/s in one process"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.console import Console
 
-from loco_drake.cli.output import write_json
+from loco_drake.cli.output import write_results
 from loco_drake.common.errors import InputError, check_at_least, check_choice
 from loco_drake.common.files import atomic_path
 from loco_drake.motion.gaits import parse_label
@@ -53,7 +53,7 @@ class Evaluation:
             parse_label(label)
         self.check()
         result = self.of_robots(list(ROBOTS) if self.robot == "all" else [self.robot])
-        write_json(self.json, result)
+        write_results(self.json, result)
         for name, figures in result.get("robots", {self.robot: result}).items():
             self.show(name, figures)
         return 0

@@ -10,7 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from loco_drake.common.files import atomic_path
+from loco_drake.common.files import atomic_path, figures_sha256
 
 
 def write_json(path: Path | None, figures: dict[str, Any]) -> None:
@@ -18,6 +18,11 @@ def write_json(path: Path | None, figures: dict[str, Any]) -> None:
     if path is not None:
         with atomic_path(path) as temporary:
             temporary.write_text(json.dumps(figures, indent=2) + "\n")
+
+
+def write_results(path: Path | None, figures: dict[str, Any]) -> None:
+    """Writes what ``report`` reads, with a hash that tells damage."""
+    write_json(path, {**figures, "sha256": figures_sha256(figures)})
 
 
 def print_table(

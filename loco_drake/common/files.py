@@ -16,6 +16,8 @@ import platformdirs
 
 from loco_drake.common.errors import InputError
 
+# Figures that depend on the machine and what else it does, and the hash itself.
+TIMES = ("real_time_factor", "frames_per_second", "wall_clock_s", "seconds", "sha256")
 _MAX_JSON_BYTES = 64 * 2**20
 
 
@@ -170,6 +172,20 @@ def content_sha256(header: Mapping[str, Any], parts: Mapping[str, bytes]) -> str
         digest.update(f"\n{name}\n".encode())
         digest.update(data)
     return digest.hexdigest()
+
+
+def figures_sha256(figures: Any) -> str:
+    """Returns the hash of what a command measured, but for TIMES.
+
+    Two runs with one seed have the same.
+    """
+
+    def lasting(value: Any) -> Any:
+        if isinstance(value, Mapping):
+            return {k: lasting(v) for k, v in value.items() if k not in TIMES}
+        return list(map(lasting, value)) if isinstance(value, list | tuple) else value
+
+    return content_sha256(lasting(figures), {})
 
 
 def cache_dir() -> Path:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError
-from loco_drake.common.files import read_json
+from loco_drake.common.files import figures_sha256, read_json
 from loco_drake.evaluation.report.content import CONTENT
 from loco_drake.models.robots import ROBOTS
 from loco_drake.models.shipped import pretrained_dir
@@ -242,6 +242,9 @@ def load_results(folder: Path) -> Results:
 
 def _by_robot(path: Path, file: ResultFile) -> dict[str, Figures]:
     whole = Figures(read_json(path), path)
+    written = whole.text("sha256")
+    if written and written != figures_sha256(whole.values):
+        raise whole.damaged("its figures are not those that were written")
     if "robots" in whole.values:
         robots = dict(whole.parts("robots"))
     elif whole.text("robot") in ROBOTS:

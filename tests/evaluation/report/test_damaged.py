@@ -1,17 +1,21 @@
 """Whatever is wrong in a file of results is said in one sentence."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
 from loco_drake.common.errors import InputError
+from loco_drake.common.files import TIMES, figures_sha256
 from loco_drake.evaluation.report import pictures
 from loco_drake.evaluation.report.page import of_results
 from loco_drake.evaluation.report.results import load_results, results_dir
 from tests.report_results import learning, tokenizer, tracking
 
 SHIPPED = sorted(path.name for path in results_dir().glob("*.json"))
+# What the hash leaves out, in bytes: a number or a list of numbers, or the hash.
+TIMED = rf'"({"|".join(TIMES)})":\s*(\[[^]]*\]|"?[0-9a-f.+-]+"?)'.encode()
 WRONG = ("a word", [], {}, 3, None, True, float("nan"), 1e300, 10**400, [[1.0]], "$x_{")
 
 
@@ -41,6 +45,8 @@ def said_of(folder, name, written):
 
 
 def refused(folder, name, content):
+    content = {**content}
+    content.pop("sha256", None)  # which would tell them all
     return said_of(folder, name, json.dumps(content).encode()) is not None
 
 
@@ -138,3 +144,34 @@ def test_labels_of_results_need_not_be_those_of_the_package(tmp_path):
     content = tracking()
     content["labels"]["cat-sneak"] = content["labels"]["dog-trot"]
     assert not refused(tmp_path, "tracking-go2-generated.json", content)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_flipped_digit_is_noticed(name, tmp_path, monkeypatch):
+    """One digit of each of ten figures, but for times, becomes another."""
+    for picture in ("confusion", "returns", "learning"):
+        monkeypatch.setattr(pictures, f"{picture}_picture", lambda *_: "")
+    written = (results_dir() / name).read_bytes()
+    assert said_of(tmp_path, name, written) is None
+    random = np.random.default_rng(0)
+    times = [m.span() for m in re.finditer(TIMED, written)]
+    digits = [
+        m.start()
+        for m in re.finditer(rb"(?<=[0-9.])[0-9]", written)
+        if not any(first <= m.start() < last for first, last in times)
+    ]
+    for place in random.choice(digits, 10, replace=False):
+        other = b"1" if written[place : place + 1] != b"1" else b"7"
+        damaged = written[:place] + other + written[place + 1 :]
+        if json.loads(damaged) == json.loads(written):
+            continue  # the seventeenth digit of the same number
+        said = said_of(tmp_path, name, damaged) or "nothing"
+        assert "its figures are not those that were written" in said
+
+
+def test_times_may_differ_between_runs_with_one_seed():
+    """By hand: the hash of two files that differ in how fast the machine was."""
+    fast = {"labels": {"dog-trot": {"fid": 1.5}}, "real_time_factor": 9.0}
+    slow = {**fast, "real_time_factor": 4.0}
+    assert figures_sha256(fast) == figures_sha256(slow)
+    assert figures_sha256(fast) != figures_sha256({**fast, "fid": 2.0})
