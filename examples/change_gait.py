@@ -9,11 +9,9 @@ from math import hypot
 
 import tyro
 from pydrake.geometry import Meshcat
-from pydrake.systems.analysis import Simulator
 
+import loco_drake as ld
 from loco_drake.motion.gaits import LABELS, parse_label
-from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
-from loco_drake.systems.scenario import LoadScenario
 
 SCENARIO = "{reference: !GeneratedReference {gait: 'dog-pace,dog-trot@4', seed: 3}}"
 
@@ -22,13 +20,13 @@ def change_gait(
     then: str = "horse-walk", duration: float = 16.0, meshcat: bool = False
 ) -> None:
     """Simulates ``duration`` seconds; ``then`` is asked for in their middle."""
-    scenario = LoadScenario(data=SCENARIO)
+    scenario = ld.LoadScenario(data=SCENARIO)
     scenario.plant.visual = meshcat
-    diagram = MakeLocomotionDiagram(scenario, meshcat=Meshcat() if meshcat else None)
-    simulator = Simulator(diagram)
-    simulator.set_target_realtime_rate(1.0 if meshcat else 0.0)
+    scenario.simulator.target_realtime_rate = 1.0 if meshcat else 0.0
+    diagram = ld.MakeLocomotionDiagram(scenario, meshcat=Meshcat() if meshcat else None)
+    simulator = ld.MakeSimulator(diagram, scenario)
     context = simulator.get_mutable_context()
-    StartOnPlan(simulator)
+    ld.StartEpisode(simulator)
     asked = float(parse_label(then).index)
     gait, distance, seconds, here = None, 0.0, 0, (0.0, 0.0)
     for second in range(1, round(duration) + 1):

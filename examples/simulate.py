@@ -8,22 +8,20 @@ from math import hypot
 
 import tyro
 from pydrake.geometry import Meshcat
-from pydrake.systems.analysis import Simulator
 
-from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
-from loco_drake.systems.scenario import LoadScenario
+import loco_drake as ld
 
 SCENARIO = "{robot: go2, reference: !GeneratedReference {gait: dog-trot, seed: 3}}"
 
 
 def simulate(duration: float = 10.0, meshcat: bool = False) -> None:
     """Simulates ``duration`` seconds."""
-    scenario = LoadScenario(data=SCENARIO)
+    scenario = ld.LoadScenario(data=SCENARIO)
     scenario.plant.visual = meshcat
-    diagram = MakeLocomotionDiagram(scenario, meshcat=Meshcat() if meshcat else None)
-    simulator = Simulator(diagram)
-    simulator.set_target_realtime_rate(1.0 if meshcat else 0.0)
-    StartOnPlan(simulator)
+    scenario.simulator.target_realtime_rate = 1.0 if meshcat else 0.0
+    diagram = ld.MakeLocomotionDiagram(scenario, meshcat=Meshcat() if meshcat else None)
+    simulator = ld.MakeSimulator(diagram, scenario)
+    ld.StartEpisode(simulator)
     simulator.AdvanceTo(duration)
     x, y = diagram.GetOutputPort("state").Eval(simulator.get_context())[4:6]
     print(f"From start to end: {hypot(x, y) / duration:.2f} m/s")

@@ -14,12 +14,11 @@ import torch
 import tyro
 
 from loco_drake.control.plan import plan_from_motion
-from loco_drake.control.retiming import path_limits
+from loco_drake.control.retiming import path_limits, smooth_plan
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
-from loco_drake.systems.toppra_smoother import smooth_plan
 from loco_drake.tracking.ppo import PpoConfig
 from loco_drake.tracking.train import Progress, TrainingConfig, train_tracker
 

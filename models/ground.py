@@ -82,8 +82,13 @@ def SetGround(
         stiffness: in N/m; that of a contact is k_foot k / (k_foot + k). Such ground
             is damped like the feet, so that the damping of a contact stays theirs.
     """
-    (ground,) = plant.GetCollisionGeometriesForBody(plant.world_body())
     inspector = scene_graph.get_query_output_port().Eval(context).inspector()
+    # Whoever shares the plant may have put shapes of their own into the world.
+    (ground,) = (
+        shape
+        for shape in plant.GetCollisionGeometriesForBody(plant.world_body())
+        if inspector.GetName(shape).split("::")[-1] == "ground"
+    )
     properties = ProximityProperties(inspector.GetProximityProperties(ground))
     if friction is not None:
         properties.UpdateProperty(

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import SpatialInertia
+from pydrake.multibody.tree import ModelInstanceIndex, RigidBody, SpatialInertia
 from pydrake.systems.framework import Context
 from scipy.optimize import minimize
 
@@ -24,7 +24,7 @@ _POSES, _REFINED = 1000, 4
 
 
 def SetTrunkLoad(
-    plant: MultibodyPlant,
+    trunk: RigidBody,
     context: Context,
     *,
     mass: float,
@@ -36,12 +36,11 @@ def SetTrunkLoad(
     if the trunk were denser.
 
     Args:
-        plant: with a robot of :func:`.robots.AddRobotModel`.
-        context: the plant's.
+        trunk: of a robot of :func:`.robots.AddRobotModel`.
+        context: its plant's.
         mass: added, kg; negative ones make the trunk lighter.
         p_shift_B: of the centre of mass, in B, m, shape (3,).
     """
-    trunk = plant.GetBodyByName("base")
     M_BBo = trunk.default_spatial_inertia()
     own = M_BBo.get_mass()
     p_BoBcm = M_BBo.get_com()
@@ -57,12 +56,16 @@ def SetTrunkLoad(
 
 
 def SetReflectedInertia(
-    plant: MultibodyPlant, context: Context, inertia: Array
+    plant: MultibodyPlant,
+    instance: ModelInstanceIndex,
+    context: Context,
+    inertia: Array,
 ) -> None:
     """Sets the inertia of the rotors as seen at the joints.
 
     Args:
         plant: with a robot of :func:`.robots.AddRobotModel`.
+        instance: the robot's.
         context: the plant's.
         inertia: by actuator, kg m^2, shape (12,); may be below 0, where links make up
             for it.
@@ -70,8 +73,7 @@ def SetReflectedInertia(
     Raises:
         InputError: if the mass matrix would not be positive definite in every pose.
     """
-    indices = plant.GetJointActuatorIndices()
-    instance = plant.get_joint_actuator(indices[0]).model_instance()
+    indices = plant.GetJointActuatorIndices(instance)
     robot = get_robot(plant.GetModelInstanceName(instance))
     least = robot.reflected_inertia - removable_inertia(robot)
     if not (np.isfinite(inertia) & (inertia >= least)).all():
@@ -99,7 +101,12 @@ def removable_inertia(robot: Robot) -> float:
     robot.AddModel(Parser(plant))
     plant.Finalize()
     context = plant.CreateDefaultContext()
-    SetTrunkLoad(plant, context, mass=LEAST_PAYLOAD, p_shift_B=np.zeros(3))
+    SetTrunkLoad(
+        plant.GetBodyByName(robot.trunk_frame),
+        context,
+        mass=LEAST_PAYLOAD,
+        p_shift_B=np.zeros(3),
+    )
 
     def least(joints: Array) -> float:
         plant.SetPositions(context, [1.0, *[0.0] * 6, *joints])
@@ -117,7 +124,7 @@ def removable_inertia(robot: Robot) -> float:
 def surplus_inertia(robot: Robot, plant: PlantConfig) -> Array:
     """Returns the inertia that the implicit PD of a motor at no strength has, (12,).
 
-    In kg m^2; see :class:`loco_drake.systems.actuation.Actuation`.
+    In kg m^2; see :class:`loco_drake.systems.domain.Actuation`.
     """
     h = 0.0 if plant.contact == "cenic" else plant.time_step
     return (robot.kd + robot.kp * h) * h

@@ -1,5 +1,6 @@
 """A robot on flat ground as a MultibodyPlant, ready to be driven."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,7 +51,10 @@ class PlantConfig:
 
 
 def AddRobotPlant(
-    builder: DiagramBuilder, robot: Robot, config: PlantConfig
+    builder: DiagramBuilder,
+    robot: Robot,
+    config: PlantConfig,
+    pre_finalize: Callable[[MultibodyPlant, SceneGraph], None] | None = None,
 ) -> tuple[MultibodyPlant, SceneGraph, ModelInstanceIndex]:
     """Adds a finalized plant with ``robot`` and a ground, and a scene graph.
 
@@ -65,6 +69,7 @@ def AddRobotPlant(
         robot: from :func:`loco_drake.models.robots.get_robot`.
         config: contact, step and friction. With "cenic" the caller must also call
             :func:`ConfigureSimulator`.
+        pre_finalize: adds whatever else there is to be in the plant.
 
     Returns:
         The plant, the scene graph and the robot's model instance.
@@ -91,9 +96,12 @@ def AddRobotPlant(
     scene_graph.set_config(scene_graph_config)
     instance = AddRobotModel(Parser(plant), robot.name, visual=config.visual)
     AddGround(plant, friction=config.friction, visual=config.visual)
+    if pre_finalize is not None:
+        pre_finalize(plant, scene_graph)
     plant.Finalize()
     plant.SetDefaultPositions(
-        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, robot.stand_height, *robot.stand_joints]
+        instance,
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, robot.stand_height, *robot.stand_joints],
     )
     return plant, scene_graph, instance
 

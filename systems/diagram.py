@@ -1,31 +1,40 @@
 """The diagram of a robot that does what a plan says."""
 
-from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.analysis import Simulator
+from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import (
-    Context,
     Diagram,
     DiagramBuilder,
     InputPort,
     LeafSystem,
     OutputPort,
 )
+from pydrake.systems.lcm import ApplyLcmBusConfig
+from pydrake.visualization import ApplyVisualizationConfig
 
+from loco_drake.common.errors import InputError
 from loco_drake.control.actor import load_actor
-from loco_drake.control.plan import Plan, plan_from_motion
+from loco_drake.control.plan import plan_from_motion
 from loco_drake.models.plant import AddRobotPlant
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.models.shipped import policy_path
 from loco_drake.motion.motion_file import load_motion
 
-from .actuation import Actuation
-from .joint_targets import JointTargets
+from .control import (
+    JointTargets,
+    Observation,
+    PlanState,
+    RobotState,
+    TrackingPolicy,
+    TrackingReward,
+)
+from .domain import Actuation, Pushes, Sensors
 from .keypoint_visualizer import KeypointVisualizer
-from .observation import Observation
 from .plan_player import PlanPlayer
-from .plan_state import PlanState
-from .pushes import Pushes
 from .scenario import (
     ExternalAction,
     ExternalTargets,
@@ -34,10 +43,35 @@ from .scenario import (
     Scenario,
     TrainedPolicy,
 )
-from .sensors import Sensors
 from .toppra_smoother import ToppraSmoother
-from .tracking_policy import TrackingPolicy
-from .tracking_reward import TrackingReward
+
+
+@dataclass(frozen=True)
+class Locomotion:
+    """What :func:`AddLocomotion` added, to connect to.
+
+    Attributes:
+        robot: the robot.
+        plant: finalized, with the robot in it.
+        scene_graph: the plant's.
+        instance: the robot's in the plant.
+        inputs: ports by name, those of :func:`MakeLocomotionDiagram`.
+        outputs: the same.
+    """
+
+    robot: Robot
+    plant: MultibodyPlant
+    scene_graph: SceneGraph
+    instance: ModelInstanceIndex
+    inputs: dict[str, InputPort] = field(default_factory=dict)
+    outputs: dict[str, OutputPort] = field(default_factory=dict)
+
+    def ExportPorts(self, builder: DiagramBuilder) -> None:
+        """Exports all of its ports by their names."""
+        for name, port in self.inputs.items():
+            builder.ExportInput(port, name)
+        for name, port in self.outputs.items():
+            builder.ExportOutput(port, name)
 
 
 def MakeLocomotionDiagram(
@@ -49,9 +83,9 @@ def MakeLocomotionDiagram(
 
         name: LocomotionDiagram
         input_ports:
-        - gait (optional, of a generated reference: index into LABELS)
-        - action (of ExternalAction)
-        - desired_state (of ExternalTargets, which has only the last two outputs)
+        - gait
+        - action
+        - desired_state
         output_ports:
         - plan
         - plan_state
@@ -63,196 +97,207 @@ def MakeLocomotionDiagram(
         - state
         - net_actuation
 
-    The subsystems are named plant, scene_graph, reference, smoother, observation,
-    policy, joint_targets, plan_state and reward, and actuation, pushes and sensors of
-    the scenario's disturbances; what is not asked for is not there.
+    Ports:
+        gait: optional, of a generated reference: index into LABELS, size 1.
+        action: in of ExternalAction only; in units of ACTION_SCALE, size J.
+        desired_state: in of ExternalTargets only, which has none of the outputs but the
+            last two; what the PD is sent, [q_d, 0], rad and rad/s, size 2 J.
+        plan: the Plan that is followed.
+        plan_state: [q, v] that it wants now, size 13 + 2 J; m, rad, s.
+        path_time: seconds of motion as it was written, size 1.
+        observation: what the policy sees, see OBSERVATION_LAYOUT.
+        reward_terms: weighted, see REWARD_TERMS, size 5.
+        state: [q, v] of the robot, its quaternion of length one, size 13 + 2 J.
+        net_actuation: torques of the joints, Nm, size J.
+
+    The subsystems are named plant, scene_graph, robot_state, reference, smoother,
+    observation, policy, joint_targets, plan_state and reward, and actuation, pushes and
+    sensors of the scenario's disturbances; what is not asked for is not there.
     Simulate it like this, since a robot must start where its plan starts::
 
-        simulator = Simulator(diagram)
-        StartOnPlan(simulator)
+        simulator = MakeSimulator(diagram, scenario)
+        StartEpisode(simulator)
         simulator.AdvanceTo(10.0)
+
+    Drake never frees a diagram that holds systems written in Python: make one and start
+    episodes in it.
 
     Args:
         scenario: what to simulate.
         meshcat: where to draw the robot and the plan's keypoints, if anywhere.
 
     Raises:
-        InputError: if the scenario names what does not exist.
+        InputError: if the scenario is not sound, or names what does not exist.
     """
-    robot = get_robot(scenario.robot)
     builder = DiagramBuilder()
-    plant, scene_graph, instance = AddRobotPlant(builder, robot, scenario.plant)
-    state = plant.get_state_output_port()
-    desired_state = plant.get_desired_state_input_port(instance)
-    measured, desired_state = _AddDisturbances(
-        builder, robot, scenario, plant, desired_state
-    )
-    plan = None
-    if isinstance(scenario.policy, ExternalTargets):
-        builder.ExportInput(desired_state, "desired_state")
-    else:
-        plan = _AddPlan(builder, robot, scenario)
-        _AddControl(builder, robot, scenario.policy, plan, measured, desired_state)
-        _AddScores(builder, robot, plan, state)
-    builder.ExportOutput(state, "state")
-    builder.ExportOutput(plant.get_net_actuation_output_port(instance), "net_actuation")
-
-    if meshcat is not None:
-        MeshcatVisualizer.AddToBuilder(
-            builder, scene_graph, meshcat, MeshcatVisualizerParams()
-        )
-        if plan is not None:
-            drawing = builder.AddNamedSystem(
-                "plan_visualizer", KeypointVisualizer(robot, meshcat)
-            )
-            builder.Connect(plan, drawing.GetInputPort("plan"))
+    AddLocomotion(builder, scenario, meshcat=meshcat).ExportPorts(builder)
     diagram = builder.Build()
     diagram.set_name("locomotion")
     return diagram
 
 
-def _AddDisturbances(
+def AddLocomotion(
     builder: DiagramBuilder,
-    robot: Robot,
     scenario: Scenario,
-    plant: MultibodyPlant,
-    desired_state: InputPort,
+    *,
+    meshcat: Meshcat | None = None,
+    pre_finalize: Callable[[MultibodyPlant, SceneGraph], None] | None = None,
+) -> Locomotion:
+    """Adds to ``builder`` what ``scenario`` describes; nothing is exported.
+
+    Args:
+        builder: of a diagram that has no plant yet.
+        scenario: what to simulate.
+        meshcat: where to draw the robot and the plan's keypoints, if anywhere.
+        pre_finalize: adds bodies of your own to the robot's plant.
+
+    Returns:
+        The plant, and the ports of :func:`MakeLocomotionDiagram` by name.
+
+    Raises:
+        InputError: if the scenario is not sound, or names what does not exist.
+    """
+    scenario.check()
+    if builder.HasSubsystemNamed("plant"):
+        raise InputError(
+            "The builder has a system named plant already: AddLocomotion makes the "
+            "plant, and its pre_finalize adds your bodies to it."
+        )
+    robot = get_robot(scenario.robot)
+    plant, scene_graph, instance = AddRobotPlant(
+        builder, robot, scenario.plant, pre_finalize
+    )
+    made = Locomotion(robot, plant, scene_graph, instance)
+    robot_state = builder.AddNamedSystem("robot_state", RobotState(robot))
+    builder.Connect(
+        plant.get_state_output_port(instance), robot_state.GetInputPort("plant_state")
+    )
+    state = robot_state.GetOutputPort("state")
+    measured, desired_state = _AddDisturbances(builder, made, scenario, state)
+    if isinstance(scenario.policy, ExternalTargets):
+        made.inputs["desired_state"] = desired_state
+    else:
+        _AddPlan(builder, made, scenario)
+        _AddControl(builder, made, scenario, measured, desired_state)
+        _AddScores(builder, made, state)
+    made.outputs["state"] = state
+    made.outputs["net_actuation"] = plant.get_net_actuation_output_port(instance)
+    if meshcat is not None:
+        ApplyVisualizationConfig(
+            scenario.visualization,
+            builder,
+            # Without a bus of that name it would publish to LCM as well.
+            lcm_buses=ApplyLcmBusConfig({"default": None}, builder),
+            meshcat=meshcat,
+        )
+        if "plan" in made.outputs:
+            drawing = KeypointVisualizer(robot, meshcat)
+            _Add(builder, "plan_visualizer", drawing, plan=made.outputs["plan"])
+    return made
+
+
+def _Add(
+    builder: DiagramBuilder, name: str, system: LeafSystem, **inputs: OutputPort
+) -> LeafSystem:
+    """Adds a system and connects its input ports, by name."""
+    builder.AddNamedSystem(name, system)
+    for port, source in inputs.items():
+        builder.Connect(source, system.GetInputPort(port))
+    return system
+
+
+def _AddDisturbances(
+    builder: DiagramBuilder, made: Locomotion, scenario: Scenario, state: OutputPort
 ) -> tuple[OutputPort, InputPort]:
     """Adds what makes the world unlike the model.
 
     Returns:
         The state as it is measured, and the port that takes the PD's set-points.
     """
-    state = measured = plant.get_state_output_port()
-    if scenario.disturbances.actuation:
-        actuation = builder.AddNamedSystem(
-            "actuation", Actuation(robot, scenario.plant)
-        )
-        builder.Connect(state, actuation.GetInputPort("state"))
+    robot, plant, wanted = made.robot, made.plant, scenario.disturbances
+    desired_state = plant.get_desired_state_input_port(made.instance)
+    measured = state
+    if wanted.actuation:
+        actuation = Actuation(robot, scenario.plant)
+        _Add(builder, "actuation", actuation, state=state)
         builder.Connect(actuation.GetOutputPort("desired_state"), desired_state)
         desired_state = actuation.GetInputPort("desired_state")
-    if scenario.disturbances.pushes:
-        trunk = plant.GetBodyByName(robot.trunk_frame).index()
-        pushes = builder.AddNamedSystem("pushes", Pushes(trunk))
+        made.outputs["desired_state"] = actuation.GetOutputPort("desired_state")
+    if wanted.pushes:
+        trunk = plant.GetBodyByName(robot.trunk_frame, made.instance).index()
+        pushes = _Add(builder, "pushes", Pushes(trunk))
         builder.Connect(
             pushes.GetOutputPort("spatial_forces"),
             plant.get_applied_spatial_force_input_port(),
         )
-    if scenario.disturbances.sensors:
-        sensors = builder.AddNamedSystem("sensors", Sensors(robot))
-        builder.Connect(state, sensors.GetInputPort("state"))
+    if wanted.sensors:
+        sensors = _Add(builder, "sensors", Sensors(robot), state=state)
         measured = sensors.GetOutputPort("state")
     return measured, desired_state
 
 
-def _AddPlan(builder: DiagramBuilder, robot: Robot, scenario: Scenario) -> OutputPort:
-    """Adds what makes the plan, exports it and returns its port."""
-    reference = _AddReference(builder, robot, scenario)
-    plan = reference.GetOutputPort("plan")
+def _AddPlan(builder: DiagramBuilder, made: Locomotion, scenario: Scenario) -> None:
+    """Adds what makes the plan."""
+    reference = _MakeReference(made.robot, scenario)
+    _Add(builder, "reference", reference)
+    made.outputs["plan"] = reference.GetOutputPort("plan")
+    if reference.HasInputPort("gait"):
+        made.inputs["gait"] = reference.GetInputPort("gait")
     if scenario.smoother is not None:
-        smoother = builder.AddNamedSystem(
-            "smoother", ToppraSmoother(robot, scenario.smoother)
-        )
-        builder.Connect(plan, smoother.GetInputPort("plan"))
-        plan = smoother.GetOutputPort("plan")
+        smoother = ToppraSmoother(made.robot, scenario.smoother)
+        _Add(builder, "smoother", smoother, plan=made.outputs["plan"])
+        made.outputs["plan"] = smoother.GetOutputPort("plan")
         if reference.HasInputPort("path_time"):
             builder.Connect(
-                smoother.GetOutputPort("path_time"),
-                reference.GetInputPort("path_time"),
+                smoother.GetOutputPort("path_time"), reference.GetInputPort("path_time")
             )
-    builder.ExportOutput(plan, "plan")
-    if reference.HasInputPort("gait"):
-        builder.ExportInput(reference.GetInputPort("gait"), "gait")
-    return plan
 
 
-def _AddReference(
-    builder: DiagramBuilder, robot: Robot, scenario: Scenario
-) -> LeafSystem:
+def _MakeReference(robot: Robot, scenario: Scenario) -> LeafSystem:
     reference = scenario.reference
     if isinstance(reference, GeneratedReference):
         # Loads torch models, which players do without.
         from .reference_generator import ReferenceGenerator
 
-        return builder.AddNamedSystem("reference", ReferenceGenerator(robot, reference))
-    plan: Plan | None = None
+        return ReferenceGenerator(robot, reference)
     if isinstance(reference, MotionReference):
-        plan = plan_from_motion(robot, load_motion(reference.path))
-    return builder.AddNamedSystem("reference", PlanPlayer(robot, plan))
+        return PlanPlayer(robot, plan_from_motion(robot, load_motion(reference.path)))
+    return PlanPlayer(robot)
 
 
 def _AddControl(
     builder: DiagramBuilder,
-    robot: Robot,
-    config: TrainedPolicy | ExternalAction,
-    plan: OutputPort,
+    made: Locomotion,
+    scenario: Scenario,
     state: OutputPort,
     desired_state: InputPort,
 ) -> None:
     """Adds what turns plan and state into the PD's set-points."""
-    targets = builder.AddNamedSystem("joint_targets", JointTargets(robot))
-    builder.Connect(plan, targets.GetInputPort("plan"))
+    robot, plan = made.robot, made.outputs["plan"]
+    targets = _Add(builder, "joint_targets", JointTargets(robot), plan=plan)
     builder.Connect(targets.GetOutputPort("desired_state"), desired_state)
-    observation = builder.AddNamedSystem("observation", Observation(robot))
-    builder.Connect(plan, observation.GetInputPort("plan"))
-    builder.Connect(state, observation.GetInputPort("state"))
-    builder.Connect(targets.GetOutputPort("action"), observation.GetInputPort("action"))
-    if isinstance(config, ExternalAction):
-        builder.ExportInput(targets.GetInputPort("action"), "action")
-    else:
-        weights = policy_path(robot, config.weights)
-        policy = builder.AddNamedSystem(
-            "policy", TrackingPolicy(load_actor(weights, robot))
-        )
-        builder.Connect(
-            observation.GetOutputPort("observation"), policy.GetInputPort("observation")
-        )
+    action = targets.GetOutputPort("action")
+    observation = Observation(robot)
+    _Add(builder, "observation", observation, plan=plan, state=state, action=action)
+    seen = observation.GetOutputPort("observation")
+    if isinstance(scenario.policy, ExternalAction):
+        made.inputs["action"] = targets.GetInputPort("action")
+    elif isinstance(scenario.policy, TrainedPolicy):
+        actor = load_actor(policy_path(robot, scenario.policy.weights), robot)
+        policy = _Add(builder, "policy", TrackingPolicy(actor), observation=seen)
         builder.Connect(policy.GetOutputPort("action"), targets.GetInputPort("action"))
-    builder.ExportOutput(observation.GetOutputPort("observation"), "observation")
-    builder.ExportOutput(targets.GetOutputPort("action"), "action")
-    # What reaches the PD.
-    last = "actuation" if builder.HasSubsystemNamed("actuation") else "joint_targets"
-    sent = builder.GetSubsystemByName(last).GetOutputPort("desired_state")
-    builder.ExportOutput(sent, "desired_state")
+    made.outputs["observation"] = seen
+    made.outputs["action"] = action
+    # What reaches the PD, which is the actuation's if there is one.
+    made.outputs.setdefault("desired_state", targets.GetOutputPort("desired_state"))
 
 
-def _AddScores(
-    builder: DiagramBuilder, robot: Robot, plan: OutputPort, state: OutputPort
-) -> None:
+def _AddScores(builder: DiagramBuilder, made: Locomotion, state: OutputPort) -> None:
     """Adds what says how well the plan is followed."""
-    reward = builder.AddNamedSystem("reward", TrackingReward(robot))
-    builder.Connect(plan, reward.GetInputPort("plan"))
-    builder.Connect(state, reward.GetInputPort("state"))
-    builder.ExportOutput(reward.GetOutputPort("reward_terms"), "reward_terms")
-    plan_state = builder.AddNamedSystem("plan_state", PlanState(robot))
-    builder.Connect(plan, plan_state.GetInputPort("plan"))
-    builder.ExportOutput(plan_state.GetOutputPort("state"), "plan_state")
-    builder.ExportOutput(plan_state.GetOutputPort("path_time"), "path_time")
-
-
-def StartOnPlan(simulator: Simulator, diagram: Diagram | None = None) -> None:
-    """Initializes the simulator with the robot in the first state of its plan.
-
-    The plan of a generator or smoother exists only after initialization, and a robot
-    that starts elsewhere would begin with a jump.
-
-    Args:
-        simulator: of a locomotion diagram, or of a diagram that holds one.
-        diagram: the locomotion diagram; by default the simulator's system.
-    """
-    diagram = diagram or simulator.get_system()
-    simulator.Initialize()
-    PlaceOnPlan(
-        diagram, diagram.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-    )
-    # Publishes (logs, Meshcat) must see the robot where it starts.
-    simulator.Initialize()
-
-
-def PlaceOnPlan(diagram: Diagram, context: Context) -> None:
-    """Sets the robot's state to that of the plan; ``context`` is the diagram's."""
-    state = diagram.GetOutputPort("plan_state").Eval(context)
-    plant = diagram.GetSubsystemByName("plant")
-    plant.SetPositionsAndVelocities(
-        diagram.GetMutableSubsystemContext(plant, context), state
-    )
+    plan = made.outputs["plan"]
+    reward = TrackingReward(made.robot)
+    _Add(builder, "reward", reward, plan=plan, state=state)
+    made.outputs["reward_terms"] = reward.GetOutputPort("reward_terms")
+    plan_state = _Add(builder, "plan_state", PlanState(made.robot), plan=plan)
+    made.outputs["plan_state"] = plan_state.GetOutputPort("state")
+    made.outputs["path_time"] = plan_state.GetOutputPort("path_time")

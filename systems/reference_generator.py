@@ -15,7 +15,7 @@ from pydrake.systems.framework import (
 
 from loco_drake.common.errors import InputError
 from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD, Plan, join_plans, make_plan
-from loco_drake.generation.generate import check_sampling, chunk_labels
+from loco_drake.generation.generate import chunk_labels
 from loco_drake.generation.motion_model import (
     MotionModel,
     Stream,
@@ -23,7 +23,7 @@ from loco_drake.generation.motion_model import (
 )
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gait_schedule import GaitSchedule, parse_schedule
-from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.gaits import LABELS, GaitLabel
 
 from .scenario import GeneratedReference
 
@@ -53,6 +53,11 @@ class ReferenceGenerator(LeafSystem):
         - path_time (optional)
         output_ports:
         - plan
+
+    Ports:
+        gait: index into LABELS, size 1.
+        path_time: seconds of the plan that have been used up, size 1.
+        plan: a Plan, open-ended.
 
     ``path_time`` (s) is how much of the plan has been used up: what the smoother has
     committed; if it is not connected, the context's time. The configured gait may be a
@@ -84,7 +89,7 @@ class ReferenceGenerator(LeafSystem):
         self._robot = robot
         self._config = config or GeneratedReference()
         self._horizon = horizon
-        _check(self._config)
+        self._config.check()
         self._model = model or pretrained_motion_model(robot.name)
         self._gait = self.DeclareVectorInputPort("gait", 1)
         self._path_time = self.DeclareVectorInputPort("path_time", 1)
@@ -100,16 +105,23 @@ class ReferenceGenerator(LeafSystem):
             period_sec=UPDATE_PERIOD, offset_sec=0.0, update=self._update
         )
 
-    def SetReference(self, context: Context, *, gait: str, seed: int) -> None:
-        """Begins anew, from time 0, with a gait and a seed.
+    def SetReference(
+        self, context: Context, *, gait: str | None = None, seed: int | None = None
+    ) -> None:
+        """Begins anew, from plan time 0; see :func:`.simulator.StartEpisode`.
 
         Args:
             context: this system's own.
-            gait: a gait label, or a schedule of several.
-            seed: what the tokens are drawn with.
+            gait: a gait label, or a schedule of several; by default the configured one.
+            seed: what the tokens are drawn with; by default the configured one.
         """
-        _check(replace(self._config, gait=gait, seed=seed))
-        script = self._begun(gait, seed)
+        config = replace(
+            self._config,
+            gait=self._config.gait if gait is None else gait,
+            seed=self._config.seed if seed is None else seed,
+        )
+        config.check()
+        script = self._begun(config.gait, config.seed)
         context.get_mutable_abstract_state(int(self._script)).set_value(script)
 
     def _begun(self, gait: str, seed: int) -> _Script:
@@ -133,13 +145,7 @@ class ReferenceGenerator(LeafSystem):
         old = self._get(context)
         schedule = old.schedule
         if self._gait.HasValue(context):
-            index = int(self._gait.Eval(context)[0])
-            if not 0 <= index < len(LABELS):
-                raise InputError(
-                    f"The gait must be an index from 0 to {len(LABELS) - 1}, "
-                    f"not {index}."
-                )
-            schedule = GaitSchedule((LABELS[index],))
+            schedule = GaitSchedule((self._label(self._gait.Eval(context)[0]),))
         used = context.get_time()
         if self._path_time.HasValue(context):
             used = float(self._path_time.Eval(context)[0])
@@ -148,6 +154,19 @@ class ReferenceGenerator(LeafSystem):
             return EventStatus.DidNothing()
         state.get_mutable_abstract_state(int(self._script)).set_value(new)
         return EventStatus.Succeeded()
+
+    def _label(self, index: float) -> GaitLabel:
+        """Returns the gait that the input port asks for."""
+        known = self._model.generator.config.labels
+        if index not in [k for k, label in enumerate(LABELS) if str(label) in known]:
+            choices = ", ".join(
+                f"{k} {label}" for k, label in enumerate(LABELS) if str(label) in known
+            )
+            raise InputError(
+                f"The input port gait must be the index of a gait, {choices}; not "
+                f"{index:g}."
+            )
+        return LABELS[int(index)]
 
     def _written(self, script: _Script, schedule: GaitSchedule, used: float) -> _Script:
         """Returns ``script`` with chunks added until the horizon is reached."""
@@ -180,13 +199,3 @@ class ReferenceGenerator(LeafSystem):
         if old > self._model.chunk_frames:
             script = replace(script, plan=plan.tail(old))
         return script
-
-
-def _check(config: GeneratedReference) -> None:
-    """Raises InputError unless every field is sensible."""
-    parse_schedule(config.gait)
-    if config.seed < 0:
-        raise InputError(f"The seed must be 0 or more, not {config.seed}.")
-    if not (np.isfinite(config.duration) and config.duration > 0):
-        raise InputError(f"The duration must be above 0 s, not {config.duration}.")
-    check_sampling(config.temperature, config.top_p)

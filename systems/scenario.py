@@ -3,12 +3,21 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 from pydrake.common.yaml import yaml_load_typed
+from pydrake.systems.analysis import SimulatorConfig
+from pydrake.visualization import VisualizationConfig
 
-from loco_drake.common.errors import InputError
+from loco_drake.common.errors import InputError, check_choice, check_number
+from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD
 from loco_drake.models.plant import PlantConfig
+from loco_drake.models.robots import ROBOTS
+from loco_drake.motion.gait_schedule import parse_schedule
 
-from .toppra_smoother import SmootherConfig
+# Of a scenario's text: the loader calls itself for each bracket, and copies at each
+# alias.
+_MAX_SIZE = 100_000
+_MAX_BRACKETS = 200
 
 # Mutable dataclasses and no tuples: yaml_load_typed sets fields one by one.
 
@@ -29,6 +38,16 @@ class GeneratedReference:
     # Tokens are drawn from the likeliest that make up this much probability.
     top_p: float = 0.95
 
+    def check(self) -> None:
+        """Raises InputError unless every field is sound."""
+        parse_schedule(str(self.gait))
+        check_number("The reference's seed", self.seed, 0, 2**63 - 1)
+        if not isinstance(self.seed, int | np.integer):
+            raise InputError(f"The reference's seed must be whole, not {self.seed}.")
+        check_number("The reference's duration", self.duration, PLAN_DT)
+        check_number("The reference's temperature", self.temperature, 0.0)
+        check_number("The reference's top_p", self.top_p, 1e-6, 1.0)
+
 
 @dataclass(kw_only=True)
 class MotionReference:
@@ -40,6 +59,25 @@ class MotionReference:
 @dataclass(kw_only=True)
 class PlanReference:
     """A plan set from code with PlanPlayer.SetPlan; at first, to stand still."""
+
+
+@dataclass(kw_only=True)
+class SmootherConfig:
+    """How far and how often plans are re-timed."""
+
+    # Seconds of plan that are committed at a time; as much again is solved for, so that
+    # the motion can always go on from what is committed.
+    chunk: float = 0.96
+    # Seconds of smoothed plan kept ahead of the clock.
+    lookahead: float = 1.0
+
+    def check(self) -> None:
+        """Raises InputError unless the smoother can work so."""
+        # At least one period of its updates; and two chunks must fit into the 3 s that
+        # the generator has written ahead, less what it writes at a time.
+        check_number("The smoother's chunk", self.chunk, UPDATE_PERIOD, 1.4)
+        # The policy looks .16 s ahead.
+        check_number("The smoother's lookahead", self.lookahead, 0.16, 10.0)
 
 
 @dataclass(kw_only=True)
@@ -77,9 +115,15 @@ class Disturbances:
     sensors: bool = False
 
 
+def _visualization() -> VisualizationConfig:
+    return VisualizationConfig(
+        publish_proximity=False, publish_inertia=False, publish_contacts=False
+    )
+
+
 @dataclass(kw_only=True)
 class Scenario:
-    """Everything that :func:`MakeLocomotionDiagram` needs to know."""
+    """Everything that a diagram and its simulator are made of."""
 
     # One of loco_drake.models.robots.ROBOTS.
     robot: str = "go2"
@@ -97,6 +141,28 @@ class Scenario:
     )
     # What there is between policy and robot beyond the model.
     disturbances: Disturbances = field(default_factory=Disturbances)
+    # Drake's: target_realtime_rate. The integrator follows from the plant's contact.
+    simulator: SimulatorConfig = field(default_factory=SimulatorConfig)
+    # Drake's: what Meshcat shows, and how often.
+    visualization: VisualizationConfig = field(default_factory=_visualization)
+
+    def check(self) -> None:
+        """Raises InputError unless every field is sound."""
+        check_choice("robot", self.robot, ROBOTS)
+        self.plant.check()
+        if isinstance(self.reference, GeneratedReference):
+            self.reference.check()
+        if self.smoother is not None:
+            self.smoother.check()
+        rate = self.simulator.target_realtime_rate
+        check_number("The simulator's target_realtime_rate", rate, 0.0)
+        if repr(self.simulator) != repr(SimulatorConfig(target_realtime_rate=rate)):
+            raise InputError(
+                "Of a scenario's simulator only target_realtime_rate can be set: the "
+                "integrator follows from the plant's contact, accuracy and time_step."
+            )
+        period = self.visualization.publish_period
+        check_number("The visualization's publish_period", period, 1e-3, 10.0)
 
 
 def LoadScenario(
@@ -110,25 +176,42 @@ def LoadScenario(
         overlay: YAML text that overrides fields of the above.
 
     Raises:
-        InputError: if a field is unknown or of a wrong type, or a file is missing.
+        InputError: if a file cannot be read, a field is unknown or of a wrong type, or
+            a value is out of its bounds.
     """
+    if filename is not None:
+        data = _read(Path(filename))
     scenario = Scenario()
+    for text in (data, overlay):
+        if text is not None:
+            scenario = _overlaid(scenario, text)
+    scenario.check()
+    return scenario
+
+
+def _read(path: Path) -> str:
+    if not path.is_file():
+        raise InputError(f"There is no scenario file {str(path)!r}.")
+    if path.stat().st_size > _MAX_SIZE:
+        raise InputError(f"{path} is too large for a scenario, above {_MAX_SIZE} B.")
     try:
-        if filename is not None and not Path(filename).is_file():
-            raise InputError(f"There is no scenario file {str(filename)!r}.")
-        if filename is not None or data is not None:
-            scenario = yaml_load_typed(
-                schema=Scenario,
-                filename=None if filename is None else str(filename),
-                data=data,
-                defaults=scenario,
-            )
-        if overlay is not None:
-            scenario = yaml_load_typed(schema=Scenario, data=overlay, defaults=scenario)
-    except InputError:
-        raise
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{path} is no scenario: it is not text in UTF-8.") from None
+
+
+def _overlaid(scenario: Scenario, text: str) -> Scenario:
+    # The loader would recurse for each bracket, and copy for each alias.
+    if len(text) > _MAX_SIZE or sum(map(text.count, "[{*")) > _MAX_BRACKETS:
+        raise InputError(
+            f"A scenario has at most {_MAX_SIZE} characters and {_MAX_BRACKETS} "
+            "brackets and aliases."
+        )
+    try:
+        result = yaml_load_typed(schema=Scenario, data=text, defaults=scenario)
     except Exception as error:
         # The loader raises whatever the YAML library and the types raise.
-        reason = " ".join(str(error).split())
+        reason = " ".join(str(error).split())[:300] or type(error).__name__
         raise InputError(f"This scenario cannot be read: {reason}") from None
-    return scenario
+    assert isinstance(result, Scenario)
+    return result

@@ -120,23 +120,20 @@ def test_source_distribution_holds_the_linked_folders(tmp_path):
 
 STEP = """
 import numpy as np
-from pydrake.systems.analysis import Simulator
 
-import loco_drake
-from loco_drake.models.robots import get_robot
-from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
-from loco_drake.systems.scenario import LoadScenario
+import loco_drake as ld
 
-diagram = MakeLocomotionDiagram(LoadScenario(
+scenario = ld.LoadScenario(
     data="{reference: !PlanReference {}, policy: !ExternalAction {}}"
-))
-simulator = Simulator(diagram)
+)
+diagram = ld.MakeLocomotionDiagram(scenario)
+simulator = ld.MakeSimulator(diagram, scenario)
 diagram.GetInputPort("action").FixValue(simulator.get_mutable_context(), np.zeros(12))
-StartOnPlan(simulator)
+ld.StartEpisode(simulator)
 simulator.AdvanceTo(0.5)
 state = diagram.GetOutputPort("state").Eval(simulator.get_context())
-print(loco_drake.__file__)
-print(get_robot("go2").mass, state[6])
+print(ld.__file__)
+print(ld.get_robot("go2").mass, state[6])
 """
 
 COMMAND = """

@@ -2,6 +2,9 @@
 
 import re
 from collections.abc import Iterable
+from math import inf, isfinite
+from numbers import Real
+from typing import Any
 
 _LONGEST_WORD = 300  # a path may be as long; what is longer is no word
 _LONGEST_NAME = 64
@@ -70,3 +73,19 @@ def check_at_least(option: str, value: int, least: int) -> None:
     if value < least:
         name = option.replace("_", "-")
         raise InputError(f"--{name} must be {least} or more, not {value}.")
+
+
+def check_number(what: str, value: Any, low: float, high: float = inf) -> None:
+    """Raises InputError unless ``value`` is a finite number from ``low`` to ``high``.
+
+    Args:
+        what: its name, which begins the sentence.
+        value: what was given.
+        low: the least that is allowed.
+        high: the most; infinity for no bound.
+    """
+    number = isinstance(value, Real) and not isinstance(value, bool)
+    if not (number and isfinite(value) and low <= value <= high):
+        most = "" if high == inf else f" to {high:g}"
+        bounds = f"from {low:g}{most}" if most else f"of at least {low:g}"
+        raise InputError(f"{what} must be a number {bounds}, not {quoted(value)}.")

@@ -4,17 +4,70 @@ Domain randomization (Tobin et al. 2017; Tan et al. 2018, "Sim-to-real") draws a
 for each episode; :mod:`loco_drake.systems.domain` sets it in a Context.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from math import inf
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.errors import InputError, check_number
+from loco_drake.models.parameters import LEAST_PAYLOAD
+
 Array = NDArray[np.float64]
+
+MAX_LATENCY = 0.1  # s
+_JOINTS = 12
+# Name and size of each part of an error, in order.
+ERROR_LAYOUT = (
+    ("orientation", 3),  # rotation vector in B, rad
+    ("position", 3),  # of the base in the world, m
+    ("joint_positions", 12),  # rad
+    ("angular_velocity", 3),  # of the base, in B, rad/s
+    ("velocity", 3),  # of the base, in B, m/s
+    ("joint_velocities", 12),  # rad/s
+)
+ERROR_SIZE = sum(size for _, size in ERROR_LAYOUT)
+
+# The least and most of each field of a Domain that is a number, or an array of them.
+BOUNDS = {
+    "friction": (1e-3, inf),
+    "stiffness": (1.0, inf),
+    "payload": (LEAST_PAYLOAD, inf),
+    "com_shift": (-0.2, 0.2),
+    "strength": (0.5, 1.5),
+    "latency": (0.0, MAX_LATENCY),
+}
+
+
+class _Checked:
+    """A dataclass whose numbers are checked, and whose arrays are read-only copies."""
+
+    def _check(self, what: str, shapes: dict[str, int], **bounds: Any) -> None:
+        for field in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            name = f"The {what}'s {field.name}"
+            if value is None or field.name not in {*shapes, *bounds}:
+                continue
+            low, high = bounds.get(field.name, (-inf, inf))
+            if field.name not in shapes:
+                check_number(name, value, low, high)
+                continue
+            try:
+                array = np.array(value, dtype=np.float64)
+            except (TypeError, ValueError):
+                array = np.zeros(0)
+            size = shapes[field.name]
+            inside = np.isfinite(array) & (low <= array) & (array <= high)
+            if array.shape != (size,) or not inside.all():
+                between = "" if low == -inf else f" from {low:g} to {high:g}"
+                raise InputError(f"{name} must be {size} finite numbers{between}.")
+            array.setflags(write=False)
+            object.__setattr__(self, field.name, array)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Push:
+class Push(_Checked):
     """A constant force on the trunk, at its origin.
 
     Attributes:
@@ -27,9 +80,12 @@ class Push:
     duration: float
     force_W: Array
 
+    def __post_init__(self) -> None:
+        self._check("push", {"force_W": 3}, start=(0.0, inf), duration=(0.0, inf))
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class SensorErrors:
+class SensorErrors(_Checked):
     """What is wrong with the measured state; the order is that of :mod:`.measurement`.
 
     Attributes:
@@ -43,9 +99,13 @@ class SensorErrors:
     white: Array
     seed: int
 
+    def __post_init__(self) -> None:
+        sizes = {"bias": ERROR_SIZE, "white": ERROR_SIZE}
+        self._check("sensor errors", sizes, white=(0.0, inf), seed=(0, inf))
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Domain:
+class Domain(_Checked):
     """One world; whatever is not given is as in the model.
 
     Like a Plan it is immutable, and a copy of it is the same object.
@@ -62,6 +122,9 @@ class Domain:
             steps of the physics.
         pushes: in any order; where they overlap, forces add up.
         sensors: errors of what the robot measures.
+
+    Raises:
+        InputError: if a number is not within its :data:`BOUNDS`.
     """
 
     friction: float | None = None
@@ -72,6 +135,9 @@ class Domain:
     latency: float = 0.0
     pushes: tuple[Push, ...] = ()
     sensors: SensorErrors | None = None
+
+    def __post_init__(self) -> None:
+        self._check("domain", {"com_shift": 3, "strength": _JOINTS}, **BOUNDS)
 
     def needs(self, name: str) -> bool:
         """Returns whether it takes the disturbing system of this name."""

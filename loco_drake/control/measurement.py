@@ -4,20 +4,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.rotations import quat_exp, quat_multiply, quat_rotate
-from loco_drake.control.domain import SensorErrors
+from loco_drake.control.domain import ERROR_LAYOUT, ERROR_SIZE, SensorErrors
+from loco_drake.control.state import (
+    ANGULAR_VELOCITY,
+    JOINT_VELOCITIES,
+    ORIENTATION,
+    VELOCITY,
+    split,
+)
 
 Array = NDArray[np.float64]
-
-# Name and size of each part of an error, in order.
-ERROR_LAYOUT = (
-    ("orientation", 3),  # rotation vector in B, rad
-    ("position", 3),  # of the base in the world, m
-    ("joint_positions", 12),  # rad
-    ("angular_velocity", 3),  # of the base, in B, rad/s
-    ("velocity", 3),  # of the base, in B, m/s
-    ("joint_velocities", 12),  # rad/s
-)
-ERROR_SIZE = sum(size for _, size in ERROR_LAYOUT)
 
 
 def error_vector(**sizes: float) -> Array:
@@ -46,11 +42,12 @@ def measure(state: Array, error: Array) -> Array:
         state: the plant's [q, v], shape (..., 37).
         error: see :data:`ERROR_LAYOUT`, shape (..., ERROR_SIZE).
     """
-    q_WB = state[..., :4]
     measured = state.copy()
-    measured[..., :4] = quat_multiply(q_WB, quat_exp(error[..., :3]))
-    measured[..., 4:19] += error[..., 3:18]
-    measured[..., 19:22] += quat_rotate(q_WB, error[..., 18:21])
-    measured[..., 22:25] += quat_rotate(q_WB, error[..., 21:24])
-    measured[..., 25:] += error[..., 24:]
+    q, v = split(measured)
+    q_WB = state[ORIENTATION]
+    q[ORIENTATION] = quat_multiply(q_WB, quat_exp(error[..., :3]))
+    q[..., 4:] += error[..., 3:18]
+    v[ANGULAR_VELOCITY] += quat_rotate(q_WB, error[..., 18:21])
+    v[VELOCITY] += quat_rotate(q_WB, error[..., 21:24])
+    v[JOINT_VELOCITIES] += error[..., 24:]
     return measured

@@ -1,6 +1,7 @@
 """TOPP-RA along a plan: slow down where the actuators cannot follow, never speed up."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import toppra
@@ -10,8 +11,16 @@ from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 from toppra.interpolator import AbstractGeometricPath
 
+from loco_drake.common.rotations import quat_continuous
 from loco_drake.control.action import GRAVITY
-from loco_drake.control.plan import PLAN_DT
+from loco_drake.control.plan import (
+    PLAN_DT,
+    Plan,
+    join_plans,
+    make_plan,
+    standing_plan,
+)
+from loco_drake.control.state import HEIGHT, JOINTS, ORIENTATION
 from loco_drake.models.robots import Robot
 
 Array = NDArray[np.float64]
@@ -191,3 +200,113 @@ def _sample(grid: Array, rates: Array, commit: float) -> Clock:
     rate = rates[i] + acceleration * tau
     keep = s <= commit + 1e-9
     return Clock(s[keep], np.minimum(rate[keep], 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """How far a plan has been re-timed; immutable, and a copy is the same object.
+
+    Attributes:
+        plan: what has been re-timed.
+        path_time: plan time of its last sample, s.
+        rate: ds/dt there.
+        source: the plan that it was made of; None before there is anything.
+    """
+
+    plan: Plan
+    path_time: float = 0.0
+    rate: float = 1.0
+    source: Plan | None = None
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Progress":
+        return self
+
+    def goes_on_in(self, raw: Plan) -> bool:
+        """Returns whether ``raw`` holds the sample that was re-timed last.
+
+        If it does not, it is another motion, not the same one written further.
+        """
+        source = self.source
+        if source is None or raw is source:
+            return source is not None
+        here, there = (
+            plan.q[int(np.searchsorted(plan.path_time, self.path_time)) :][:1]
+            for plan in (source, raw)
+        )
+        return np.array_equal(here, there)
+
+
+def smooth_chunk(
+    robot: Robot, limits: PathLimits, progress: Progress, raw: Plan, chunk: float
+) -> Progress | None:
+    """Returns ``progress`` with one more chunk, or None if ``raw`` is too short.
+
+    An open-ended plan must reach two chunks ahead; of a plan that ends, the last
+    chunk may be shorter.
+    """
+    begun = progress.source is not None
+    start = progress.path_time if begun else float(raw.path_time[0])
+    last = float(raw.path_time[-1])
+    if last - start < (2 * chunk if raw.open_ended else 2 * PLAN_DT):
+        return None
+    end = min(start + 2 * chunk, last)
+    commit = min(start + chunk, last)
+    # A margin on both sides makes the spline the same from one window to the next.
+    margin = 12 * PLAN_DT
+    window = slice(
+        int(np.searchsorted(raw.path_time, start - margin)),
+        int(np.searchsorted(raw.path_time, end + margin, side="right")),
+    )
+    clock = retime(
+        raw.path_time[window],
+        np.column_stack((raw.q[window][JOINTS], raw.q[window, HEIGHT])),
+        limits,
+        start=start,
+        end=end,
+        commit=commit,
+        start_rate=progress.rate,
+    )
+    if not begun:
+        plan = _follow(robot, raw, window, clock, progress.plan.start_time)
+    else:
+        # The first sample is the last of what is committed already.
+        clock = Clock(clock.path_time[1:], clock.rate[1:])
+        if not len(clock.path_time):
+            return None
+        added = _follow(robot, raw, window, clock, progress.plan.end_time + PLAN_DT)
+        plan = join_plans(progress.plan, added)
+    return Progress(plan, float(clock.path_time[-1]), float(clock.rate[-1]), raw)
+
+
+def _follow(robot: Robot, raw: Plan, window: slice, clock: Clock, start: float) -> Plan:
+    """Returns ``raw`` as played by ``clock``, from context time ``start``."""
+    s = clock.path_time
+    times = raw.path_time[window]
+    waypoints = raw.q[window].copy()
+    waypoints[ORIENTATION] = quat_continuous(waypoints[ORIENTATION])
+    q = CubicSpline(times, waypoints)(s)
+    q[ORIENTATION] /= np.linalg.norm(q[ORIENTATION], axis=1, keepdims=True)
+    v = np.stack([np.interp(s, times, column) for column in raw.v[window].T], axis=1)
+    nearest = window.start + np.clip(
+        np.rint((s - times[0]) / PLAN_DT).astype(int), 0, len(times) - 1
+    )
+    return make_plan(
+        robot,
+        q=q,
+        v=v * clock.rate[:, None],
+        contacts=raw.contacts[nearest],
+        labels=raw.labels[nearest],
+        start_time=start,
+        path_time=s,
+        open_ended=raw.open_ended,
+    )
+
+
+def smooth_plan(
+    robot: Robot, raw: Plan, limits: PathLimits, chunk: float = 0.96
+) -> Plan:
+    """Returns the whole of ``raw``, re-timed chunk by chunk as the system does it."""
+    progress = Progress(standing_plan(robot, raw.start_time))
+    while (extended := smooth_chunk(robot, limits, progress, raw, chunk)) is not None:
+        progress = extended
+    return progress.plan

@@ -2,49 +2,47 @@
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Meshcat
-from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context, EventStatus
+from pydrake.systems.framework import Context, DiagramBuilder, EventStatus
+from pydrake.systems.primitives import LogVectorOutput
 
-from loco_drake.control.domain import Domain
 from loco_drake.control.fall import has_fallen
-from loco_drake.control.plan import PLAN_DT, Plan
+from loco_drake.control.plan import PLAN_DT
+from loco_drake.control.state import unit_base
 from loco_drake.evaluation.tracking import Rollout
-from loco_drake.models.plant import ConfigureSimulator
-from loco_drake.models.robots import get_robot
-from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
-from loco_drake.systems.domain import SetDomain
+from loco_drake.systems.diagram import AddLocomotion
 from loco_drake.systems.scenario import Scenario
+from loco_drake.systems.simulator import MakeSimulator, StartEpisode
 
-_RECORDED = ("state", "plan_state", "path_time", "desired_state", "reward_terms")
+_LOGGED = ("state", "plan_state", "path_time", "desired_state", "reward_terms")
 
 
 class Recorder:
-    """The locomotion diagram, to be simulated any number of times.
-
-    Its output ports are read after every control period. There is no diagram around it
-    with loggers: Drake's CENIC looks for the plant among the root's own systems.
+    """The locomotion diagram with logs of its ports, for any number of episodes.
 
     Args:
         scenario: what to simulate.
         meshcat: where to draw it, if anywhere.
 
     Attributes:
-        diagram: the locomotion diagram.
+        diagram: has the ports of a locomotion diagram.
         simulator: of ``diagram``.
     """
 
     def __init__(self, scenario: Scenario, meshcat: Meshcat | None = None) -> None:
-        self._robot = get_robot(scenario.robot)
-        self.diagram = MakeLocomotionDiagram(scenario, meshcat=meshcat)
-        self.simulator = Simulator(self.diagram)
-        ConfigureSimulator(self.simulator, scenario.plant)
-        self._ports = [self.diagram.GetOutputPort(name) for name in _RECORDED]
-        self._plant = self.diagram.GetSubsystemByName("plant")
-        self._samples: list[list[NDArray[np.float64]]] = []
+        builder = DiagramBuilder()
+        self._made = AddLocomotion(builder, scenario, meshcat=meshcat)
+        self._logs = [
+            LogVectorOutput(self._made.outputs[name], builder, publish_period=PLAN_DT)
+            for name in _LOGGED
+        ]
+        self._made.ExportPorts(builder)
+        self.diagram = builder.Build()
+        self.simulator = MakeSimulator(self.diagram, scenario)
+        self.simulator.set_monitor(self._monitor)
         self._fell = False
 
     @property
@@ -52,38 +50,12 @@ class Recorder:
         """The diagram's context."""
         return self.simulator.get_mutable_context()
 
-    def start(
-        self,
-        *,
-        gait: str | None = None,
-        seed: int = 0,
-        plan: Plan | None = None,
-        domain: Domain | None = None,
-    ) -> None:
-        """Puts the clock to 0, the robot on its plan and forgets what was recorded.
-
-        Args:
-            gait: of a generated reference, instead of the scenario's.
-            seed: of a generated reference, used with ``gait``.
-            plan: of a reference that is played, instead of the scenario's.
-            domain: in what the world differs from the model; the scenario must have the
-                disturbances for it.
-        """
+    def start(self, **episode: Any) -> None:
+        """Starts an episode, see :func:`StartEpisode`; forgets what was recorded."""
+        for log in self._logs:
+            log.FindMutableLog(self.context).Clear()
+        StartEpisode(self.simulator, **episode)
         self._fell = False
-        self.simulator.clear_monitor()
-        self.diagram.SetDefaultContext(self.context)
-        self.context.SetTime(0.0)
-        if domain is not None:
-            SetDomain(self.diagram, self.context, domain)
-        reference = self.diagram.GetSubsystemByName("reference")
-        context = reference.GetMyMutableContextFromRoot(self.context)
-        if gait is not None:
-            reference.SetReference(context, gait=gait, seed=seed)
-        if plan is not None:
-            reference.SetPlan(context, plan)
-        StartOnPlan(self.simulator)
-        self._samples = [self._sample()]
-        self.simulator.set_monitor(self._monitor)
 
     def run(
         self, duration: float, after_step: Callable[[float], None] | None = None
@@ -98,18 +70,19 @@ class Recorder:
             What happened, and the seconds spent inside AdvanceTo.
         """
         steps = round(duration / PLAN_DT)
-        wall = 0.0
-        for step in range(1, steps + 1):
+        wall, done = 0.0, 0
+        while done < steps and not self._fell:
             start = time.perf_counter()
-            self.simulator.AdvanceTo(step * PLAN_DT)
+            self.simulator.AdvanceTo((done + 1) * PLAN_DT)
             wall += time.perf_counter() - start
-            if self._fell:
-                break
-            self._samples.append(self._sample())
-            if after_step is not None:
-                after_step(step * PLAN_DT)
+            if not self._fell:
+                done += 1
+                if after_step is not None:
+                    after_step(done * PLAN_DT)
+        # Copies, since the logs are cleared. A sample at the moment of a fall is left
+        # out: its step was lost.
         state, plan_state, path_time, desired_state, reward_terms = (
-            np.array(samples) for samples in zip(*self._samples, strict=True)
+            log.FindLog(self.context).data().T[: done + 1].copy() for log in self._logs
         )
         rollout = Rollout(
             state=state,
@@ -122,12 +95,10 @@ class Recorder:
         )
         return rollout, wall
 
-    def _sample(self) -> list[NDArray[np.float64]]:
-        return [port.Eval(self.context) for port in self._ports]
-
     def _monitor(self, root: Context) -> EventStatus:
-        context = self._plant.GetMyContextFromRoot(root)
-        if has_fallen(self._robot, np.asarray(self._plant.GetPositions(context))):
+        plant, instance = self._made.plant, self._made.instance
+        q = plant.GetPositions(plant.GetMyContextFromRoot(root), instance)
+        if has_fallen(self._made.robot, unit_base(np.asarray(q))):
             self._fell = True
-            return EventStatus.ReachedTermination(self._plant, "the robot fell")
+            return EventStatus.ReachedTermination(plant, "the robot fell")
         return EventStatus.DidNothing()

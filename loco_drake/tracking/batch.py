@@ -11,6 +11,7 @@ from loco_drake.control.measurement import draw_error, measure
 from loco_drake.control.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.reward import reward_terms
+from loco_drake.control.state import unit_base
 from loco_drake.models.robots import get_robot
 from loco_drake.tracking.environment_config import EnvironmentConfig
 from loco_drake.tracking.physics import make_worlds
@@ -117,6 +118,7 @@ class TrackingBatch:
         desired_state = joint_targets(self._set_points[now], self._action)
         for i, state in enumerate(self._state):
             self._state[i] = self._worlds[i].advance(state, desired_state[i])
+        self._state = unit_base(self._state)
         wanted, toes = self._wanted[now], self._toes[now]
         self._R_WB = quat_to_matrix(self._state[:, :4])
         terms = reward_terms(self._robot, wanted, toes, self._state, self._R_WB)

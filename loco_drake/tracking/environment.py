@@ -24,7 +24,7 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
     """A robot that is to follow a plan, drawn at random for each episode.
 
     Observations are those of :mod:`loco_drake.control.observation`, actions those of
-    :class:`loco_drake.systems.joint_targets.JointTargets`, rewards the sum of
+    :class:`loco_drake.systems.control.JointTargets`, rewards the sum of
     :func:`loco_drake.control.reward.reward_terms`, at most 1 a step, less
     what the configuration's ``homing`` and ``fall_cost`` take, by default nothing. An
     episode starts in a state of the plan (reference state initialization, Peng et al.

@@ -1,18 +1,18 @@
 """What differs from episode to episode: the distribution of domains."""
 
 from dataclasses import dataclass, fields, replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError
-from loco_drake.control.domain import Domain, Push, SensorErrors
+from loco_drake.control.domain import BOUNDS, Domain, Push, SensorErrors
 from loco_drake.control.measurement import error_vector
 from loco_drake.control.plan import PLAN_DT
-from loco_drake.models.parameters import LEAST_PAYLOAD, check_strength
+from loco_drake.models.parameters import check_strength
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import Robot
-from loco_drake.systems.actuation import MAX_LATENCY
 from loco_drake.systems.scenario import Disturbances
 
 Array = NDArray[np.float64]
@@ -79,16 +79,9 @@ class RandomizationConfig:
             robot: whose motors must be able to be that weak; None does not ask.
             plant: in which; by default the usual one.
         """
-        for name, least, most in (
-            ("friction", 1e-3, np.inf),
-            ("stiffness", 1.0, np.inf),
-            ("payload", LEAST_PAYLOAD, np.inf),
-            ("com_shift", -0.2, 0.2),
-            ("motor_strength", 0.5, 1.5),
-            ("latency", 0.0, MAX_LATENCY),
-            ("push", 0.0, np.inf),
-            ("push_interval", PUSH_DURATION, np.inf),
-        ):
+        limits = {**BOUNDS, "push": (0.0, inf), "push_interval": (PUSH_DURATION, inf)}
+        limits["motor_strength"] = limits.pop("strength")
+        for name, (least, most) in limits.items():
             bounds = getattr(self, name)
             if bounds is None:
                 continue

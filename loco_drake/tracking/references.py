@@ -5,14 +5,13 @@ from pathlib import Path
 
 from loco_drake.common.errors import InputError
 from loco_drake.control.plan import Plan, plan_from_motion
-from loco_drake.control.retiming import path_limits
+from loco_drake.control.retiming import path_limits, smooth_plan
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import parse_label
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.motion_file import load_motion
-from loco_drake.systems.toppra_smoother import smooth_plan
 
 
 def smooth_motions(robot: Robot, motions: Iterable[Motion]) -> list[Plan]:

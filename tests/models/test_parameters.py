@@ -27,7 +27,9 @@ def share_of_indefinite_poses(name, strength, payload=0.0):
     robot.AddModel(Parser(plant))
     plant.Finalize()
     context = plant.CreateDefaultContext()
-    SetTrunkLoad(plant, context, mass=payload, p_shift_B=np.zeros(3))
+    SetTrunkLoad(
+        plant.GetBodyByName("base"), context, mass=payload, p_shift_B=np.zeros(3)
+    )
     for index in plant.GetJointActuatorIndices():
         actuator = plant.get_joint_actuator(index)
         ratio = actuator.default_gear_ratio()
@@ -80,8 +82,10 @@ def test_inertia_is_refused_in_the_plant_too():
     robot.AddModel(Parser(plant))
     plant.Finalize()
     context = plant.CreateDefaultContext()
-    SetReflectedInertia(plant, context, robot.reflected_inertia - 0.21 * SURPLUS)
+    instance = plant.GetModelInstanceByName("go2")
+    inertia = robot.reflected_inertia
+    SetReflectedInertia(plant, instance, context, inertia - 0.21 * SURPLUS)
     with pytest.raises(InputError, match="not positive definite in every pose"):
-        SetReflectedInertia(plant, context, robot.reflected_inertia - 0.3 * SURPLUS)
+        SetReflectedInertia(plant, instance, context, inertia - 0.3 * SURPLUS)
     with pytest.raises(InputError, match="not positive definite"):
-        SetReflectedInertia(plant, context, np.full(12, np.nan))
+        SetReflectedInertia(plant, instance, context, np.full(12, np.nan))

@@ -11,7 +11,7 @@ from loco_drake.control.actor import Actor, ActorConfig, load_actor, save_actor
 from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import policy_path, policy_variants, pretrained_dir
 from loco_drake.motion.motion_file import save_motion
-from loco_drake.systems.diagram import MakeLocomotionDiagram, StartOnPlan
+from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.scenario import (
     ExternalAction,
     ExternalTargets,
@@ -22,6 +22,7 @@ from loco_drake.systems.scenario import (
     Scenario,
     TrainedPolicy,
 )
+from loco_drake.systems.simulator import StartEpisode
 from tests.synthetic_motion import synthetic_motion
 
 
@@ -48,7 +49,7 @@ def generated(weights):
 
 def states(diagram, times):
     simulator = Simulator(diagram)
-    StartOnPlan(simulator)
+    StartEpisode(simulator)
     port = diagram.GetOutputPort("state")
     result = []
     for time in times:
@@ -70,7 +71,7 @@ def test_ports_and_systems_have_names(generated):
 
 def test_the_robot_starts_where_its_plan_starts(generated):
     simulator = Simulator(generated)
-    StartOnPlan(simulator)
+    StartEpisode(simulator)
     context = simulator.get_context()
     plan = generated.GetOutputPort("plan").Eval(context)
     state = generated.GetOutputPort("state").Eval(context)
@@ -87,7 +88,7 @@ def test_the_same_context_gives_the_same_states(generated):
 
 def test_a_cloned_context_goes_the_same_way(generated):
     simulator = Simulator(generated)
-    StartOnPlan(simulator)
+    StartEpisode(simulator)
     simulator.AdvanceTo(0.33)
     clone = Simulator(generated, simulator.get_context().Clone())
     simulator.AdvanceTo(1.5)
@@ -108,7 +109,7 @@ def test_the_plan_can_come_from_a_motion_file(tmp_path, weights):
         )
     )
     simulator = Simulator(diagram)
-    StartOnPlan(simulator)
+    StartEpisode(simulator)
     simulator.AdvanceTo(0.4)
     wanted = diagram.GetOutputPort("plan_state").Eval(simulator.get_context())
     np.testing.assert_allclose(wanted[7:19], motion.joint_positions[20], atol=1e-9)
@@ -123,7 +124,7 @@ def test_an_open_action_port_drives_the_joints():
     action = np.zeros(12)
     action[2::3] = 0.4
     port = diagram.GetInputPort("action").FixValue(context, np.zeros(12))
-    StartOnPlan(simulator)
+    StartEpisode(simulator)
     simulator.AdvanceTo(1.0)
     before = diagram.GetOutputPort("state").Eval(context)[9:19:3].copy()
     port.GetMutableData().get_mutable_value().set_value(action)
@@ -138,7 +139,7 @@ def test_open_targets_leave_the_plant_alone():
     """It stands on its stance, and bends its knees by what they are sent."""
     diagram = MakeLocomotionDiagram(Scenario(policy=ExternalTargets()))
     names = {system.get_name() for system in diagram.GetSystems()}
-    assert names == {"plant", "scene_graph"}
+    assert names == {"plant", "scene_graph", "robot_state"}
     robot = get_robot("go2")
     simulator = Simulator(diagram)
     context = simulator.get_mutable_context()

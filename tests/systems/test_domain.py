@@ -8,6 +8,7 @@ from pydrake.multibody.tree import PdControllerGains
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from loco_drake.common.errors import InputError
 from loco_drake.control.domain import Domain, Push, SensorErrors
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.models.plant import CONTACTS, ConfigureSimulator, PlantConfig
@@ -303,7 +304,7 @@ def test_a_diagram_without_the_system_is_refused(name, domain):
     SetDomain(diagram, diagram.CreateDefaultContext(), domain)
     setattr(scenario.disturbances, name, False)
     lacking = MakeLocomotionDiagram(scenario)
-    with pytest.raises(ValueError, match=f"with the system {name}"):
+    with pytest.raises(InputError, match=rf"Disturbances\({name}=True\)"):
         SetDomain(lacking, lacking.CreateDefaultContext(), domain)
 
 

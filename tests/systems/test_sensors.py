@@ -12,7 +12,7 @@ from loco_drake.control.measurement import (
 )
 from loco_drake.control.observation import OBSERVATION_LAYOUT, observe, preview
 from loco_drake.models.robots import get_robot
-from loco_drake.systems.sensors import Sensors
+from loco_drake.systems.domain import Sensors
 
 SIZES = {
     "orientation": 0.1,

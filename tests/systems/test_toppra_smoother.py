@@ -4,9 +4,9 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from loco_drake.control.plan import PLAN_DT
-from loco_drake.control.retiming import PathLimits, path_limits
+from loco_drake.control.retiming import PathLimits, path_limits, smooth_plan
 from loco_drake.systems.plan_player import PlanPlayer
-from loco_drake.systems.toppra_smoother import ToppraSmoother, smooth_plan
+from loco_drake.systems.toppra_smoother import ToppraSmoother
 
 
 def tight(robot, share):

@@ -15,7 +15,7 @@ from loco_drake.control.actor import (
 from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
 from loco_drake.control.symmetry import mirror_actions, mirror_observations
 from loco_drake.models.robots import get_robot
-from loco_drake.systems.tracking_policy import TrackingPolicy
+from loco_drake.systems.control import TrackingPolicy
 
 
 @pytest.fixture

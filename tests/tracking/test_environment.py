@@ -1,19 +1,21 @@
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from pydrake.systems.analysis import Simulator
 from scipy.spatial.transform import Rotation
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import yaw_of
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.reward import REWARD_TERMS
-from loco_drake.models.plant import ConfigureSimulator, PlantConfig
+from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import save_motion
-from loco_drake.systems.diagram import MakeLocomotionDiagram, PlaceOnPlan
+from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
+from loco_drake.systems.simulator import MakeSimulator, StartEpisode
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.environment import TrackingEnv
 from loco_drake.tracking.environment_config import EnvironmentConfig, ResetNoise
@@ -85,26 +87,22 @@ def test_a_step_is_what_the_diagram_does(plans, contact, time_step, tolerance):
     batch.reset(0, random, 0, 25)
     batch.reset(1, random, 1, 3)
 
-    diagram = MakeLocomotionDiagram(
-        Scenario(
-            plant=plant,
-            reference=PlanReference(),
-            smoother=None,
-            policy=ExternalAction(),
-        )
+    scenario = Scenario(
+        plant=plant,
+        reference=PlanReference(),
+        smoother=None,
+        policy=ExternalAction(),
     )
-    simulator = Simulator(diagram)
-    ConfigureSimulator(simulator, plant)
+    diagram = MakeLocomotionDiagram(scenario)
+    simulator = MakeSimulator(diagram, scenario)
     context = simulator.get_mutable_context()
-    context.SetTime(25 * PLAN_DT)
-    player = diagram.GetSubsystemByName("reference")
-    player.SetPlan(player.GetMyMutableContextFromRoot(context), plans[0])
-    PlaceOnPlan(diagram, context)
+    diagram.GetInputPort("action").FixValue(context, np.zeros(12))
+    StartEpisode(simulator, plan=replace(plans[0].tail(25), start_time=0.0))
     ports = [diagram.GetOutputPort(name) for name in ("observation", "reward_terms")]
     for k, action in enumerate(actions):
         terms = batch.step(np.stack((action, -action)))[0]
         diagram.GetInputPort("action").FixValue(context, action.astype(float))
-        simulator.AdvanceTo((26 + k) * PLAN_DT)
+        simulator.AdvanceTo((1 + k) * PLAN_DT)
         observation, theirs = (port.Eval(context) for port in ports)
         ours = batch.observe()[0]
         np.testing.assert_allclose(

@@ -2,7 +2,6 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from pydrake.systems.analysis import Simulator
 
 from loco_drake.common.errors import InputError
 from loco_drake.control.observation import OBSERVATION_LAYOUT
@@ -16,6 +15,7 @@ from loco_drake.systems.scenario import (
     PlanReference,
     Scenario,
 )
+from loco_drake.systems.simulator import MakeSimulator
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.environment import TrackingEnv
 from loco_drake.tracking.environment_config import EnvironmentConfig, ResetNoise
@@ -155,15 +155,15 @@ def test_a_batch_does_what_the_diagram_does(plans, go2):
         batch.step(action)
         ours.append(batch.observe()[0])
 
-    diagram = MakeLocomotionDiagram(
-        Scenario(
-            reference=PlanReference(),
-            smoother=None,
-            policy=ExternalAction(),
-            disturbances=STANDARD.disturbances,
-        )
+    scenario = Scenario(
+        reference=PlanReference(),
+        smoother=None,
+        policy=ExternalAction(),
+        disturbances=STANDARD.disturbances,
     )
-    context = diagram.CreateDefaultContext()
+    diagram = MakeLocomotionDiagram(scenario)
+    simulator = MakeSimulator(diagram, scenario)
+    context = simulator.get_mutable_context()
     end = min(25 + config.episode_steps, len(plans[0]) - 1)
     random = np.random.default_rng(7)
     random.standard_normal(33)  # the reset noise: 1 + 2 + 12 + 18
@@ -176,7 +176,6 @@ def test_a_batch_does_what_the_diagram_does(plans, go2):
     plant.SetPositionsAndVelocities(
         plant.GetMyMutableContextFromRoot(context), plans[0].state[25]
     )
-    simulator = Simulator(diagram, context)
     for k, action in enumerate(actions[:, 0]):
         diagram.GetInputPort("action").FixValue(context, action)
         simulator.AdvanceTo((26 + k) * PLAN_DT)

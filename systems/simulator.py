@@ -1,0 +1,220 @@
+"""How a locomotion diagram is simulated: its simulator, and how an episode starts."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.analysis import (
+    ExtractSimulatorConfig,
+    Simulator,
+    SimulatorStatus,
+)
+from pydrake.systems.framework import Context, Diagram
+
+from loco_drake.common.errors import InputError
+from loco_drake.control.domain import Domain
+from loco_drake.control.plan import PLAN_DT, Plan
+from loco_drake.control.state import unit_base
+from loco_drake.models.plant import ConfigureSimulator
+
+from .domain import SetDomain
+from .scenario import Scenario
+
+_TOLERANCE = 1e-6  # of a control period; context times are sums of steps
+
+
+class LocomotionSimulator(Simulator):
+    """A Simulator that holds the quaternion of each robot's base at length one.
+
+    Drake's discrete plants never normalize it, and no system can write the state of
+    another. So AdvanceTo stops at the end of each control period, where the state is
+    anybody's to set, and normalizes it there; the steps taken are the same.
+
+    Args:
+        diagram: of :func:`.diagram.MakeLocomotionDiagram`, or one that holds it or the
+            systems of :func:`.diagram.AddLocomotion`, at any depth.
+    """
+
+    def __init__(self, diagram: Diagram) -> None:
+        super().__init__(diagram)
+        self._robots = [
+            (plant, plant.GetModelInstanceByName(part.robot.name))
+            for part, plant in (
+                (each.GetSubsystemByName("robot_state"), _plant(each))
+                for each in _locomotions(diagram)
+            )
+            if plant.time_step() > 0  # CENIC normalizes
+        ]
+
+    def AdvanceTo(
+        self, boundary_time: float, interruptible: bool = True
+    ) -> SimulatorStatus:
+        """Advances to ``boundary_time``, s, or until a monitor ends the simulation."""
+        context = self.get_mutable_context()
+        while True:
+            period = math.floor(context.get_time() / PLAN_DT + _TOLERANCE) + 1
+            until = min(period * PLAN_DT, boundary_time)
+            status = super().AdvanceTo(until, interruptible=interruptible)
+            if status.reason() != SimulatorStatus.ReturnReason.kReachedBoundaryTime:
+                return status
+            if until == period * PLAN_DT:
+                self._normalize(context)
+            if until == boundary_time:
+                return status
+
+    def _normalize(self, root: Context) -> None:
+        for plant, instance in self._robots:
+            context = plant.GetMyMutableContextFromRoot(root)
+            q = plant.GetPositions(context, instance)
+            unit = unit_base(q)
+            if unit is not q:
+                plant.SetPositions(context, instance, unit)
+
+
+def MakeSimulator(diagram: Diagram, scenario: Scenario) -> LocomotionSimulator:
+    """Returns a simulator with the integrator and the real-time rate of ``scenario``.
+
+    Args:
+        diagram: see :class:`LocomotionSimulator`.
+        scenario: what the diagram was made of.
+
+    Raises:
+        InputError: if the diagram is of another scenario, or is to be simulated by
+            CENIC, which finds plants only among the root's own systems, and holds it
+            deeper.
+    """
+    parts = list(_locomotions(diagram))
+    if not parts:
+        raise InputError(
+            "This diagram has no locomotion in it: make it with MakeLocomotionDiagram "
+            "or AddLocomotion."
+        )
+    scenario.check()
+    continuous = scenario.plant.contact == "cenic"
+    for part in parts:
+        if (_plant(part).time_step() == 0) != continuous:
+            raise InputError(
+                f"The diagram was not made of this scenario, whose contact is "
+                f"{scenario.plant.contact}."
+            )
+        if continuous and part is not diagram:
+            raise InputError(
+                "CENIC finds a plant only among the root diagram's own systems: add "
+                "the locomotion to your builder with AddLocomotion, or take contact "
+                "similar, lagged or sap."
+            )
+    simulator = LocomotionSimulator(diagram)
+    ConfigureSimulator(simulator, scenario.plant)
+    simulator.set_target_realtime_rate(scenario.simulator.target_realtime_rate)
+    return simulator
+
+
+def StartEpisode(
+    simulator: Simulator,
+    *,
+    gait: str | None = None,
+    seed: int | None = None,
+    plan: Plan | None = None,
+    domain: Domain | None = None,
+    diagram: Diagram | None = None,
+) -> None:
+    """Starts anew at time 0, the robot in the first state of its plan.
+
+    All of the simulator's Context returns to its default, so that what follows is what
+    would follow in a new diagram, to the last bit; values that you fixed at input ports
+    stay. The simulator is initialized, once, with the robot in place.
+
+    Args:
+        simulator: of a locomotion diagram, or of one that holds it; see
+            :class:`LocomotionSimulator`.
+        gait: of a generated reference, instead of the scenario's.
+        seed: of a generated reference, instead of the scenario's.
+        plan: of a reference that plays plans, instead of the scenario's.
+        domain: in what the world differs from the model; the scenario must have the
+            disturbances for it.
+        diagram: which one these concern, where the simulator's holds several.
+
+    Raises:
+        InputError: if the reference cannot take these, or a continuous plant is to be
+            integrated by anything but CENIC.
+    """
+    root, context = simulator.get_system(), simulator.get_mutable_context()
+    parts = list(_locomotions(root))
+    if diagram is None and len(parts) != 1:
+        raise InputError(
+            f"The simulator's diagram holds {len(parts)} locomotion diagrams; name "
+            "one of them with diagram=."
+        )
+    chosen = diagram or parts[0]
+    scheme = ExtractSimulatorConfig(simulator).integration_scheme
+    if scheme != "cenic" and any(_plant(p).time_step() == 0 for p in parts):
+        raise InputError(
+            f"The plant is continuous, and the integrator {scheme} would take a "
+            "million steps a second for its contacts: make the simulator with "
+            "MakeSimulator."
+        )
+    root.SetDefaultContext(context)
+    context.SetTime(0.0)
+    if domain is not None:
+        SetDomain(chosen, context, domain)
+    _set_reference(chosen, context, gait=gait, seed=seed, plan=plan)
+    for part in parts:
+        _place_on_plan(part, context)
+    simulator.Initialize()
+
+
+def _set_reference(diagram: Diagram, root: Context, **given: Any) -> None:
+    """Tells the diagram's reference what is not None."""
+    given = {name: value for name, value in given.items() if value is not None}
+    if not given:
+        return
+    takes: set[str] = set()
+    if diagram.HasSubsystemNamed("reference"):
+        reference = diagram.GetSubsystemByName("reference")
+        takes = {"plan"} if hasattr(reference, "SetPlan") else {"gait", "seed"}
+    if given.keys() - takes:
+        raise InputError(
+            f"This scenario's reference takes no {' or '.join(given.keys() - takes)}: "
+            "a GeneratedReference takes gait and seed, "
+            "a MotionReference or PlanReference takes plan."
+        )
+    context = reference.GetMyMutableContextFromRoot(root)
+    if takes == {"plan"}:
+        reference.SetPlan(context, **given)
+    else:
+        reference.SetReference(context, **given)
+
+
+def _place_on_plan(diagram: Diagram, root: Context) -> None:
+    """Puts a robot that has a plan where that starts."""
+    if not diagram.HasSubsystemNamed("plan_state"):
+        return
+    if diagram.HasSubsystemNamed("smoother"):
+        # Its plan exists only after initialization.
+        smoother = diagram.GetSubsystemByName("smoother")
+        smoother.ExecuteInitializationEvents(smoother.GetMyMutableContextFromRoot(root))
+    plan_state = diagram.GetSubsystemByName("plan_state")
+    state = plan_state.GetOutputPort("state").Eval(
+        plan_state.GetMyContextFromRoot(root)
+    )
+    plant = _plant(diagram)
+    robot = diagram.GetSubsystemByName("robot_state").robot
+    plant.SetPositionsAndVelocities(
+        plant.GetMyMutableContextFromRoot(root),
+        plant.GetModelInstanceByName(robot.name),
+        state,
+    )
+
+
+def _locomotions(diagram: Diagram) -> Iterator[Diagram]:
+    """Yields the diagrams, this one or within it, that hold a robot and its plant."""
+    if diagram.HasSubsystemNamed("robot_state"):
+        yield diagram
+    for system in diagram.GetSystems():
+        if isinstance(system, Diagram):
+            yield from _locomotions(system)
+
+
+def _plant(diagram: Diagram) -> MultibodyPlant:
+    return diagram.GetSubsystemByName("plant")
