@@ -9,12 +9,6 @@ from rich.progress import Progress
 
 from loco_drake.cli.output import print_failed, print_figures, write_results
 from loco_drake.common.errors import check_at_least, check_choice
-from loco_drake.datasets.registry import data_dir
-from loco_drake.datasets.segments import read_segments, select_labels
-from loco_drake.evaluation.retargeting import score_segments, summarize
-from loco_drake.models.robot_files import is_robot_file, load_robot
-from loco_drake.models.robots import ROBOTS
-from loco_drake.retargeting.variants import Variant
 
 
 @dataclass(kw_only=True)
@@ -50,6 +44,13 @@ class EvaluateRetargeting:
         Raises:
             InputError: if an option is wrong.
         """
+        from loco_drake.datasets.registry import data_dir
+        from loco_drake.datasets.segments import read_segments, select_labels
+        from loco_drake.evaluation.retargeting import score_segments, summarize
+        from loco_drake.models.robot_files import is_robot_file, load_robot
+        from loco_drake.models.robots import ROBOTS
+        from loco_drake.retargeting.variants import Variant
+
         if not is_robot_file(self.robot):
             check_choice("robot", self.robot, (*ROBOTS, "all"))
         check_at_least("seeds", self.seeds, 1)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, fields, replace
 from math import inf
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +10,12 @@ from numpy.typing import NDArray
 from loco_drake.common.errors import InputError
 from loco_drake.control.domain import BOUNDS, Domain, Push, SensorErrors
 from loco_drake.control.measurement import error_vector
-from loco_drake.control.plan import PLAN_DT
-from loco_drake.models.parameters import check_strength
-from loco_drake.models.plant import PlantConfig
-from loco_drake.models.robots import Robot
-from loco_drake.systems.scenario import Disturbances
+
+# Commands have these ranges as options; their --help does not wait for Drake.
+if TYPE_CHECKING:
+    from loco_drake.models.plant import PlantConfig
+    from loco_drake.models.robots import Robot
+    from loco_drake.systems.scenario import Disturbances
 
 Array = NDArray[np.float64]
 
@@ -71,7 +73,7 @@ class RandomizationConfig:
     in loco_drake.tracking.randomization."""
 
     def check(
-        self, robot: Robot | None = None, plant: PlantConfig | None = None
+        self, robot: "Robot | None" = None, plant: "PlantConfig | None" = None
     ) -> None:
         """Raises InputError unless every range can be drawn from.
 
@@ -79,6 +81,9 @@ class RandomizationConfig:
             robot: whose motors must be able to be that weak; None does not ask.
             plant: in which; by default the usual one.
         """
+        from loco_drake.models.parameters import check_strength
+        from loco_drake.models.plant import PlantConfig
+
         limits = {**BOUNDS, "push": (0.0, inf), "push_interval": (PUSH_DURATION, inf)}
         limits["motor_strength"] = limits.pop("strength")
         for name, (least, most) in limits.items():
@@ -109,8 +114,10 @@ class RandomizationConfig:
         return replace(self, **missing)
 
     @property
-    def disturbances(self) -> Disturbances:
+    def disturbances(self) -> "Disturbances":
         """The systems that a diagram needs for it."""
+        from loco_drake.systems.scenario import Disturbances
+
         return Disturbances(
             actuation=self.motor_strength is not None or self.latency is not None,
             pushes=self.push is not None,
@@ -133,7 +140,7 @@ class RandomizationConfig:
         return not self.changes_physics and self.noise is None
 
     def draw(
-        self, robot: Robot, random: np.random.Generator, start: float, end: float
+        self, robot: "Robot", random: np.random.Generator, start: float, end: float
     ) -> Domain:
         """Returns a world; parts that are off draw nothing.
 
@@ -169,8 +176,10 @@ class RandomizationConfig:
         )
 
     def _draw_pushes(
-        self, robot: Robot, random: np.random.Generator, start: float, end: float
+        self, robot: "Robot", random: np.random.Generator, start: float, end: float
     ) -> tuple[Push, ...]:
+        from loco_drake.control.plan import PLAN_DT
+
         if self.push is None:
             return ()
         pushes = []
