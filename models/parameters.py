@@ -9,7 +9,6 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, RigidBody, SpatialInertia
 from pydrake.systems.framework import Context
-from scipy.optimize import minimize
 
 from loco_drake.common.errors import InputError
 
@@ -97,6 +96,8 @@ def removable_inertia(robot: Robot) -> float:
     eigenvalue of (S' M^-1 S)^-1. The least of these is searched for from many poses,
     the trunk lightened by :data:`LEAST_PAYLOAD`, and rounded down to 1e-4.
     """
+    from scipy.optimize import minimize
+
     plant = MultibodyPlant(time_step=0.0)
     robot.AddModel(Parser(plant))
     plant.Finalize()
