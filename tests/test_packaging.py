@@ -152,6 +152,7 @@ print(env.reset(seed=0)[0].shape == env.observation_space.shape, env.spec.id)
 """
 
 
+@pytest.mark.slow
 def test_installed_wheel_simulates_the_go2_outside_the_checkout(installed, tmp_path):
     """The Go2 has its mass, and stands to within a centimetre after half a second."""
     printed = run_python("-c", STEP, cwd=tmp_path, PYTHONPATH=str(installed))
@@ -176,6 +177,7 @@ raise SystemExit(main(["report", "--replays", "none"]))
 """
 
 
+@pytest.mark.slow
 def test_installed_wheel_makes_the_report_of_its_own_results(installed, tmp_path):
     run_python("-c", REPORT, cwd=tmp_path, PYTHONPATH=str(installed))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -183,6 +185,7 @@ def test_installed_wheel_makes_the_report_of_its_own_results(installed, tmp_path
     assert "Outlines of go2 and a1" in page
 
 
+@pytest.mark.slow
 def test_gymnasium_finds_the_environment_of_the_installed_wheel(installed, tmp_path):
     """In a process that has not imported loco_drake."""
     printed = run_python("-c", GYMNASIUM, cwd=tmp_path, PYTHONPATH=str(installed))

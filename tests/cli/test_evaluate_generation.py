@@ -21,6 +21,8 @@ from tests.synthetic_motion import synthetic_motion
 from tests.tiny_model import make_tiny_model
 from tests.varied_motion import as_generated, shaken
 
+pytestmark = pytest.mark.slow
+
 GO2 = get_robot("go2")
 CHEAP = {"count": 4, "generator_seeds": 2, "minutes": 0, "seeds": 1, "steps": 10}
 LABEL_KEYS = {

@@ -157,6 +157,7 @@ raise SystemExit(main(["data", "fetch", "--mirror", sys.argv[2]]))
 """
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_whole_files_only(mirror, tmp_path):
     with serve(mirror) as server:
         server.stalled.add(FILES[1])

@@ -130,6 +130,7 @@ def test_port_in_use_and_replay(weights, tmp_path, monkeypatch, capsys):
     assert 1e6 < page.stat().st_size < 10e6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["go2", "a1"])
 @pytest.mark.parametrize("gait", ["dog-pace", "dog-trot"])
 def test_shipped_weights_carry_the_robots_for_ten_seconds(gait, robot, tmp_path):

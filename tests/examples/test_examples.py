@@ -20,12 +20,14 @@ def run(cwd, name, *arguments):
     return run_python(script, *arguments, cwd=cwd, **environment)
 
 
+@pytest.mark.slow
 def test_simulate_walks_ahead(tmp_path):
     printed = run(tmp_path, "simulate.py", "--duration", "2")
     speed = float(re.search(r"([\d.]+) m/s", printed).group(1))
     assert 0.3 < speed < 2.0
 
 
+@pytest.mark.slow
 def test_change_gait_does_both_changes(tmp_path):
     """The scheduled one when it is due, the one through the port within 6 s."""
     printed = run(tmp_path, "change_gait.py", "--duration", "14")
@@ -40,6 +42,7 @@ def test_change_gait_does_both_changes(tmp_path):
     assert speeds["horse-walk"] < speeds["dog-trot"]
 
 
+@pytest.mark.slow
 def test_retarget_saves_a_replay_of_the_recording(tmp_path):
     write_dog_recording(tmp_path / "dog.txt", "trot", seconds=2.0)
     arguments = ("--gait", "trot", "--end", "90", "--html", "replay.html")
@@ -51,6 +54,7 @@ def test_retarget_saves_a_replay_of_the_recording(tmp_path):
     assert 1e6 < len(page) < 10e6
 
 
+@pytest.mark.slow
 def test_train_tracker_learns_and_leaves_a_policy_that_loads(tmp_path):
     arguments = ("--steps", "512", "--batch", "256", "--references", "1")
     few = ("--seconds", "3", "--workers", "1", "--out", "out")

@@ -168,6 +168,7 @@ print(digest.hexdigest())
 """
 
 
+@pytest.mark.slow
 def test_processes_of_any_number_of_threads_write_the_same(tmp_path):
     """Tokens and frames, to the last bit; OpenMP has as many threads as torch."""
     printed = [
@@ -183,6 +184,7 @@ def test_processes_of_any_number_of_threads_write_the_same(tmp_path):
     assert printed[0] == printed[1]
 
 
+@pytest.mark.slow
 def test_tokens_do_not_depend_on_what_is_written_beside_them():
     """One motion alone, and among 2, 5 and 32 others, at any place."""
     model = pretrained_motion_model("go2")

@@ -8,6 +8,8 @@ from loco_drake.cli.train_tokenizer import TrainTokenizer
 from loco_drake.common.errors import InputError
 from loco_drake.motion.motion_file import load_motion
 
+pytestmark = pytest.mark.slow
+
 
 def test_from_motions_to_new_motions_by_three_commands(motions, tmp_path):
     train = TrainTokenizer(

@@ -17,6 +17,8 @@ from loco_drake.tracking.checkpoint import load_checkpoint
 from tests.process import LIMIT, processes
 from tests.synthetic_motion import synthetic_motion
 
+pytestmark = pytest.mark.slow
+
 COMMAND = "from loco_drake.cli.main import main; raise SystemExit(main())"
 BATCH = 64
 

@@ -21,6 +21,8 @@ from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.train import TrainingConfig, train_tracker
 from loco_drake.tracking.workers import WorkerVecEnv
 
+pytestmark = pytest.mark.slow
+
 TROT, PACE = parse_label("dog-trot").index, parse_label("dog-pace").index
 
 
