@@ -118,8 +118,6 @@ def removable_inertia(robot: Robot) -> float:
     poses = np.random.default_rng(0).uniform(low, high, (_POSES, len(low)))
     bounds = list(zip(low, high, strict=True))
     worst = sorted(poses, key=least)[:_REFINED]
-    from scipy.optimize import minimize  # half a second
-
     found = [minimize(least, q, bounds=bounds, method="L-BFGS-B").fun for q in worst]
     return int(1e4 * min(found)) / 1e4
 

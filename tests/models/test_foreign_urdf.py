@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from loco_drake.common.errors import InputError
-from loco_drake.datasets.dog import read_dog
+from loco_drake.datasets.registry import read_clip
 from loco_drake.models.robot_files import load_robot
 from loco_drake.motion.motion import FPS
 from loco_drake.retargeting.inverse_kinematics import LegSolver
@@ -47,7 +47,7 @@ def plain(tmp_path):
 @pytest.fixture
 def dog_clip(tmp_path):
     write_dog_recording(tmp_path / "dog.txt", "trot", seconds=1.0)
-    return read_dog(tmp_path / "dog.txt", gait="trot")
+    return read_clip("dog", tmp_path / "dog.txt", gait="trot")
 
 
 def test_made_up_robot_by_hand(plain):
