@@ -20,7 +20,7 @@ from loco_drake.common.rotations import (
     quat_continuous,
     quat_rotate,
 )
-from loco_drake.models.legs import LEGS, MIRROR_JOINT_SIGNS
+from loco_drake.models.legs import LEGS, MIRROR_JOINT_SIGNS, MIRROR_POLAR
 from loco_drake.models.robots import ROBOTS, Robot, get_robot
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.quality import toe_trajectories
@@ -34,7 +34,11 @@ MAX_TURNING = 30.0  # rad/s
 MAX_JOINT_SPEED = 5.0  # times the joint's limit; what is too fast will be slowed down
 JOINT_MARGIN = 0.2  # rad beyond the limits
 GROUND_MARGIN = 0.1  # stand heights from the lowest sole to the ground
-STANCE_SPEED = 0.05  # m/s of standing toes, from which on other readings are tried
+STANCE_SPEED = 0.01  # m/s of standing toes, from which on other readings are tried
+MAX_UNKNOWN_JOINT_SPEED = 200.0  # rad/s, of a robot whose limits are not known
+
+_DOUBT = 0.2  # of what is rounding
+_TINY = 1e-9
 
 
 def in_robot_order(motion: Motion) -> Motion:
@@ -84,8 +88,15 @@ def check_conventions(motion: Motion) -> None:
     robot = get_robot(motion.robot) if motion.robot in ROBOTS else None
     if robot is not None:
         _check_joints(motion, robot)
-    _check_speeds(motion, robot)
+    steps = (
+        np.diff(motion.base_position, axis=0) * motion.fps,
+        angular_velocity(quat_continuous(motion.base_quaternion), 1 / motion.fps),
+        np.diff(motion.joint_positions, axis=0) * motion.fps,
+    )
+    _check_speeds(robot, *steps)
     _check_velocities(motion)
+    given = (motion.base_velocity, motion.base_angular_velocity)
+    _check_speeds(robot, *given, motion.joint_velocities)
     if robot is not None:
         _check_feet(motion, robot)
 
@@ -106,77 +117,96 @@ def _check_joints(motion: Motion, robot: Robot) -> None:
         )
 
 
-def _check_speeds(motion: Motion, robot: Robot | None) -> None:
-    """Checks velocities, and steps from frame to frame."""
-    steps = np.diff(motion.base_position, axis=0) * motion.fps
-    turning = angular_velocity(quat_continuous(motion.base_quaternion), 1 / motion.fps)
-    joints = np.diff(motion.joint_positions, axis=0) * motion.fps
-    limits = np.full(joints.shape[1], 200.0)  # rad/s, of a robot that is not known
+def _check_speeds(
+    robot: Robot | None, base: Array, turning: Array, joints: Array
+) -> None:
+    """Checks velocities (N, 3), (N, 3) and (N, J) for what no robot does."""
+    most: Array = np.full(joints.shape[1], MAX_UNKNOWN_JOINT_SPEED)
     if robot is not None:
-        limits = MAX_JOINT_SPEED * robot.joint_speed_limits
-    for what, unit, values, most in (
-        ("base", "m/s", (steps, motion.base_velocity), MAX_BASE_SPEED),
-        ("base", "rad/s", (turning, motion.base_angular_velocity), MAX_TURNING),
-        ("fastest joint", "rad/s", (joints, motion.joint_velocities), limits),
+        most = MAX_JOINT_SPEED * robot.joint_speed_limits
+    for what, unit, values, bound in (
+        ("Its base moves", "m/s", base, MAX_BASE_SPEED),
+        ("Its base turns", "rad/s", turning, MAX_TURNING),
+        ("A joint of it moves", "rad/s", joints, most),
     ):
-        both = np.abs(np.concatenate(values))
-        if (both > most).any():
+        if (np.abs(values) > bound).any():
             raise InputError(
-                f"Its {what} moves at {both.max():.3g} {unit} where {np.max(most):.3g} "
-                f"is the most that is plausible; are units and rate right?"
+                f"{what} at {np.abs(values).max():.3g} {unit}, but no more than "
+                f"{np.max(bound):.3g} {unit} is plausible; are units and rate right?"
             )
 
 
 def _check_velocities(motion: Motion) -> None:
     """Compares velocities with central differences, but for the first and last frame.
 
-    Any estimate of a velocity lies within the speeds nearby, so no deviation may be as
-    large as the highest speed, nor half as large in root mean square.
+    Any estimate of a velocity is like the speeds nearby: no deviation may be half as
+    large as the highest speed, nor half as large as the speeds in root mean square.
+    Smaller ones are in doubt where another convention explains most of them.
     """
-    quaternion = quat_continuous(motion.base_quaternion)
-    to_trunk = quat_conjugate(quaternion)[1:-1]
-    turning = angular_velocity(quaternion, 1 / motion.fps)[1:-1]
-    for name, rounding, true in (
-        ("base_velocity", 0.1, _differences(motion.base_position, motion.fps)),
-        ("joint_velocities", 0.5, _differences(motion.joint_positions, motion.fps)),
-        ("base_angular_velocity", 0.3, turning),
+    fps, q = motion.fps, quat_continuous(motion.base_quaternion)
+    xyzw = quat_continuous(motion.base_quaternion[:, [3, 0, 1, 2]])
+    turning = angular_velocity(q, 1 / fps)[1:-1]
+    base = _differences(motion.base_position, fps)
+    joints = _differences(motion.joint_positions, fps)
+    of_base = np.sqrt(
+        (motion.base_velocity[1:-1] ** 2).sum() / max((base**2).sum(), _TINY)
+    )
+    to_trunk = quat_conjugate(q)[1:-1]
+    for name, of, unit, rounding, true, others in (
+        (
+            "base_velocity",
+            "base_position",
+            "m/s in the world's frame",
+            0.02,
+            base,
+            {
+                "in the trunk's frame": quat_rotate(to_trunk, base),
+                f"at {of_base * fps:.3g} frames/s": of_base * base
+                # Differences of what is fast are somewhat too small.
+                if abs(np.log(max(of_base, _TINY))) > 0.15
+                else base,
+            },
+        ),
+        (
+            "base_angular_velocity",
+            "base_quaternion",
+            "rad/s in the world's frame",
+            0.05,
+            turning,
+            {
+                "in the trunk's frame": quat_rotate(to_trunk, turning),
+                "in degrees": np.degrees(turning),
+                "with quaternions x, y, z, w": angular_velocity(xyzw, 1 / fps)[1:-1],
+            },
+        ),
+        (
+            "joint_velocities",
+            "joint_positions",
+            "rad/s",
+            0.1,
+            joints,
+            {"in degrees": np.degrees(joints)},
+        ),
     ):
         given = getattr(motion, name)[1:-1]
-        if _agree(given, true, rounding):
-            continue
-        other = {
-            "they are all zero": np.zeros_like(true),
-            "they agree in degrees per second": np.degrees(true),
-        }
-        if name != "joint_velocities":
-            other["they agree in the trunk's frame"] = quat_rotate(to_trunk, true)
-        factor = np.sqrt((given**2).sum() / max((true**2).sum(), 1e-12))
-        other[f"they agree at {factor * motion.fps:.3g} frames/s"] = factor * true
-        xyzw = quat_continuous(motion.base_quaternion[:, [3, 0, 1, 2]])
-        if name == "base_angular_velocity":
-            other["they agree with quaternions x, y, z, w"] = angular_velocity(
-                xyzw, 1 / motion.fps
-            )[1:-1]
-        reasons = [k for k, v in other.items() if _agree(given, v, 0.01 * rounding)]
-        raise InputError(
-            f"Its {name} are not those of its positions, in {motion.fps:g} frames/s, "
-            f"the world's frame and SI units"
-            + "".join(f"; {r}" for r in reasons[:1])
-            + "."
-        )
+        off, speed = _rms(given - true), _rms(true)
+        others["all zero"] = np.zeros_like(true)
+        found = [how for how, v in others.items() if _rms(given - v) < off / 4]
+        far = np.abs(given - true).max() > 0.5 * np.abs(true).max() + 5 * rounding
+        if far or off > 0.5 * speed + rounding or (found and off > _DOUBT * rounding):
+            raise InputError(
+                f"The values of {name} are not the derivatives of {of}, in {unit} at "
+                f"{fps:g} frames/s" + (f"; they are {found[0]}." if found else ".")
+            )
 
 
 def _differences(values: Array, fps: float) -> Array:
-    return (values[2:] - values[:-2]) * (fps / 2)
+    differences: Array = (values[2:] - values[:-2]) * (fps / 2)
+    return differences
 
 
-def _agree(given: Array, true: Array, rounding: float) -> bool:
-    off = np.abs(given - true)
-    rms = float(np.sqrt((off**2).mean()))
-    return bool(
-        off.max() <= np.abs(true).max() + rounding
-        and rms <= 0.5 * np.sqrt((true**2).mean()) + rounding
-    )
+def _rms(values: Array) -> float:
+    return float(np.sqrt((values**2).mean()))
 
 
 def _check_feet(motion: Motion, robot: Robot) -> None:
@@ -188,6 +218,9 @@ def _check_feet(motion: Motion, robot: Robot) -> None:
         )
     slip = stance_speed(motion, robot)
     if slip > STANCE_SPEED:
+        for name in ROBOTS:
+            if stance_speed(motion, get_robot(name)) < slip / 4:
+                raise InputError(f"Its feet move as those of {name}, not {robot.name}.")
         for what, other in _other_readings(motion).items():
             if stance_speed(other, robot) < slip / 4:
                 raise InputError(
@@ -238,6 +271,8 @@ def _other_readings(motion: Motion) -> dict[str, Motion]:
     }
     turned = motion.joint_positions * MIRROR_JOINT_SIGNS
     readings["with hips of the other sign"] = replace(motion, joint_positions=turned)
+    other_y = motion.base_position * MIRROR_POLAR
+    readings["with y to the other side"] = replace(motion, base_position=other_y)
     per_leg = motion.joint_positions.reshape(len(motion), 4, -1)
     for order in list(permutations(range(4)))[1:]:
         # Leg k of the robot is at order[k] in the file.
