@@ -46,7 +46,8 @@ def files(tmp_path_factory):
     write("joints.npz", joint_positions=arrays["joint_positions"][:, :8])
     write("no_rate.npz", header=with_header(fps=None))
     write("future.npz", header=with_header(schema_version=99))
-    write("a1.npz", header=with_header(robot="a1"))
+    save_motion(synthetic_motion(seconds=0.5, name="a1"), folder / "a1.npz")
+    write("as_a1.npz", header=with_header(robot="a1"))
 
     policy = folder / "policy.safetensors"
     save_policy(policy, "go2")
@@ -97,6 +98,7 @@ WRONG = {
     "simulate --reference FILES/no_rate.npz": "lacks fps",
     "simulate --reference FILES/future.npz": "has Motion schema 99",
     "simulate --reference FILES/a1.npz": "is a motion of a1, not of go2",
+    "simulate --reference FILES/as_a1.npz": "feet move as those of go2, not a1",
     "simulate --policy FILES/none.safetensors": "There are no policy weights at",
     "simulate --policy FILES/cut.safetensors": "cut.safetensors is damaged",
     "simulate --policy FILES/cut_tokenizer.safetensors": "is damaged",
