@@ -1,40 +1,45 @@
 """Network weights on disk: safetensors whose header says what they are."""
 
 import json
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 import torch
-from safetensors import SafetensorError, safe_open
+from safetensors import safe_open
 from safetensors.torch import save_file
+from torch import Tensor
 
-from loco_drake.common.errors import InputError
-from loco_drake.common.files import atomic_path
+from loco_drake.common.errors import InputError, quoted
+from loco_drake.common.files import atomic_path, content_sha256, parse_json
 
 FORMAT_VERSION = 1
+MAX_BYTES = 4 * 2**30  # of a file
+MAX_SIZE = 4096  # any number of channels, layers, codes, ... in a header
 
 Network = TypeVar("Network", bound=torch.nn.Module)
+Config = TypeVar("Config")
 
 
 def save_weights(
     path: Path,
     kind: str,
-    tensors: dict[str, torch.Tensor],
+    tensors: dict[str, Tensor],
     config: dict[str, Any],
     *,
     half: bool = False,
 ) -> None:
-    """Writes ``tensors`` with their description, wholly or not at all.
+    """Writes ``tensors`` with their description and hash, wholly or not at all.
 
     Args:
         path: a ``.safetensors`` file.
         kind: what the weights are of: "tokenizer", "generator", "policy", ...
-        tensors: a state dict.
+        tensors: a state dict, of any types.
         config: what is needed to build the network again; must be JSON.
         half: whether to store floating-point tensors in 16 bits.
     """
-    header = {"format_version": FORMAT_VERSION, "kind": kind, "config": config}
     stored = {
         name: (value.half() if half and value.is_floating_point() else value)
         .detach()
@@ -43,16 +48,27 @@ def save_weights(
         .clone()
         for name, value in tensors.items()
     }
+    # As it will be read back: JSON knows neither tuples nor keys that are numbers.
+    header = json.loads(
+        json.dumps({"format_version": FORMAT_VERSION, "kind": kind, "config": config})
+    )
+    header["content_sha256"] = _content_sha256(header, stored)
     with atomic_path(Path(path)) as temporary:
         save_file(stored, temporary, metadata={"loco_drake": json.dumps(header)})
 
 
 def load_weights(
-    path: Path, kind: str
-) -> tuple[dict[str, torch.Tensor], dict[str, Any]]:
+    path: Path, kind: str, may_be_nan: Collection[str] = ()
+) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """Returns the tensors and the config of a weights file.
 
-    What is stored in 16 bits is returned in 32, all else as it is.
+    What is stored in 16 bits is returned in 32, all else as it is. Files of earlier
+    versions, which have no hash, are read as well.
+
+    Args:
+        path: of the file.
+        kind: what it must hold.
+        may_be_nan: tensors in which NaN has a meaning; no others may hold any.
 
     Raises:
         InputError: if the file is missing, damaged, of another kind or version.
@@ -61,12 +77,19 @@ def load_weights(
     if not path.is_file():
         raise InputError(f"There are no {kind} weights at {str(path)!r}.")
     try:
+        if path.stat().st_size > MAX_BYTES:
+            raise ValueError("too large")
         with safe_open(path, framework="pt") as file:
-            header = json.loads((file.metadata() or {})["loco_drake"])
+            header = parse_json((file.metadata() or {})["loco_drake"])
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-        version, found = int(header["format_version"]), str(header["kind"])
-        config = dict(header["config"])
-    except (SafetensorError, OSError, KeyError, TypeError, ValueError):
+        claimed = header.pop("content_sha256", None)
+        version, found, config = (
+            header.pop(key) for key in ("format_version", "kind", "config")
+        )
+        types = type(version), type(found), type(config)
+        if header or types != (int, str, dict):
+            raise ValueError("another header")
+    except Exception:  # safetensors, its Rust and json raise many kinds
         raise InputError(
             f"{path} is damaged or is not a weights file of loco_drake."
         ) from None
@@ -78,47 +101,142 @@ def load_weights(
         raise InputError(
             f"{path} holds {found} weights, but {kind} weights are needed."
         )
+    header = {"format_version": version, "kind": found, "config": config}
+    if claimed not in (None, _content_sha256(header, tensors)):
+        raise InputError(f"{path} is damaged: it was written with other content.")
+    for name, value in tensors.items():
+        finite = not value.is_floating_point() or value.float().isfinite().all()
+        if not finite and name not in may_be_nan:
+            raise InputError(f"{path} is damaged: {quoted(name)} is not finite.")
     return {
         name: value.float() if value.dtype == torch.float16 else value
         for name, value in tensors.items()
     }, config
 
 
-def load_into(
-    module: torch.nn.Module, tensors: dict[str, torch.Tensor], path: Path
-) -> None:
+def load_into(module: torch.nn.Module, tensors: dict[str, Tensor], path: Path) -> None:
     """Copies ``tensors`` into ``module``.
 
     Raises:
-        InputError: if names or shapes do not match.
+        InputError: unless names, shapes and types are the module's.
     """
-    try:
-        module.load_state_dict(tensors)
-    except RuntimeError:
+    if _signature(module.state_dict()) != _signature(tensors):
         raise InputError(
             f"The weights in {path} do not fit the network that their header describes."
+        )
+    module.load_state_dict(tensors)
+
+
+def read_config(config_class: type[Config], values: Any, path: Path) -> Config:
+    """Returns a dataclass from a header, each field checked.
+
+    Args:
+        config_class: its fields are int, float, bool, str or Any, or lists or tuples
+            of these; what has a default may be missing.
+        values: the fields as JSON.
+        path: of the file, for the message.
+
+    Raises:
+        InputError: if a field is unknown, missing, of another type, or no size.
+    """
+    hints = get_type_hints(config_class)
+    values = values if isinstance(values, dict) else {}
+    needed = [
+        field.name
+        for field in fields(config_class)  # type: ignore[arg-type]
+        if field.default is MISSING and field.default_factory is MISSING
+    ]
+    wrong = [name for name in needed if name not in values]
+    wrong += [k for k, v in values.items() if k not in hints or not _is(hints[k], v)]
+    if wrong:
+        raise InputError(f"{path} has a damaged header: {quoted(wrong[0])} is wrong.")
+    return config_class(
+        **{
+            k: tuple(v) if get_origin(hints[k]) is tuple else v
+            for k, v in values.items()
+        }
+    )
+
+
+def _is(hint: Any, value: Any) -> bool:
+    """Returns whether JSON is of a type, and neither endless nor a size beyond all."""
+    if get_origin(hint) in (list, tuple):
+        item = get_args(hint)[0]
+        return (
+            isinstance(value, list)
+            and len(value) <= MAX_SIZE
+            and all(_is(item, v) for v in value)
+        )
+    if hint is int:
+        return type(value) is int and 1 <= value <= MAX_SIZE
+    if hint is float:
+        return type(value) in (int, float) and math.isfinite(value)
+    return hint is Any or isinstance(value, hint)
+
+
+def build_network(
+    path: Path,
+    make: Callable[[Config], Network],
+    config: Config,
+    tensors: Mapping[str, Tensor],
+) -> Network:
+    """Returns the network that a header describes, with the weights of the file.
+
+    Nothing is allocated before its shapes are known to be those of the file.
+
+    Raises:
+        InputError: if it cannot be built, or the weights do not fit.
+    """
+    try:
+        with torch.device("meta"):
+            planned = make(config)
+    except Exception:  # whatever torch makes of sizes that do not go together
+        raise InputError(
+            f"{path} has a damaged header: no network can be built from it."
         ) from None
+    if _signature(planned.state_dict()) == _signature(tensors):
+        planned = make(config)
+    load_into(planned, dict(tensors), path)
+    return planned
 
 
 def load_network(
-    path: Path, kind: str, build: Callable[[dict[str, Any]], Network]
+    path: Path,
+    kind: str,
+    make: Callable[[Config], Network],
+    config_class: type[Config],
 ) -> Network:
     """Returns the network of a weights file, ready for inference.
 
     Args:
         path: of the file.
         kind: what it must hold.
-        build: returns the network, of any weights, from the "network" of the config.
+        make: returns the network, of any weights, from its config.
+        config_class: of the config, which is "network" in the file's; a dataclass.
 
     Raises:
         InputError: if the file is missing, damaged, or of something else.
     """
     tensors, config = load_weights(path, kind)
-    try:
-        network = build(dict(config["network"]))
-    except (KeyError, TypeError, ValueError):
-        raise InputError(f"{path} has a damaged {kind} header.") from None
-    load_into(network, tensors, path)
+    network_config = read_config(config_class, config.get("network"), path)
+    network = build_network(path, make, network_config, tensors)
     network.eval()
     network.requires_grad_(False)
     return network
+
+
+def _signature(tensors: Mapping[str, Tensor]) -> dict[str, Any]:
+    return {name: (value.shape, value.dtype) for name, value in tensors.items()}
+
+
+def _content_sha256(header: dict[str, Any], tensors: dict[str, Tensor]) -> str:
+    return content_sha256(
+        header,
+        {
+            f"{name} {value.dtype} {tuple(value.shape)}": value.reshape(-1)
+            .view(torch.uint8)
+            .numpy()
+            .tobytes()
+            for name, value in tensors.items()
+        },
+    )

@@ -8,7 +8,12 @@ import torch
 from torch import Tensor, nn
 
 from loco_drake.common.errors import InputError
-from loco_drake.common.weights import load_into, load_weights, save_weights
+from loco_drake.common.weights import (
+    build_network,
+    load_weights,
+    read_config,
+    save_weights,
+)
 from loco_drake.control.action import ACTION_SCALE
 from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
 from loco_drake.control.symmetry import mirror_actions, mirror_observations
@@ -118,12 +123,7 @@ def load_actor(path: Path, robot: Robot) -> Actor:
             another observation, action scale or rate.
     """
     tensors, header = load_weights(path, KIND)
-    try:
-        config = ActorConfig(**header)
-    except TypeError:
-        raise InputError(
-            f"The policy in {path} is of another version of loco_drake."
-        ) from None
+    config = read_config(ActorConfig, header, path)
     expected = ActorConfig(
         robot=robot.name,
         labels=config.labels,
@@ -137,6 +137,4 @@ def load_actor(path: Path, robot: Robot) -> Actor:
                 f": {getattr(config, name)}, not {value}" if name == "robot" else ""
             )
             raise InputError(f"The policy in {path} is for another {what}{detail}.")
-    actor = Actor(config)
-    load_into(actor, tensors, path)
-    return actor.eval()
+    return build_network(path, Actor, config, tensors).eval()

@@ -133,10 +133,4 @@ def load_classifier(path: Path) -> GaitClassifier:
     Raises:
         InputError: if the file is missing, damaged, or of something else.
     """
-
-    def build(network: dict[str, Any]) -> GaitClassifier:
-        return GaitClassifier(
-            ClassifierConfig(**{**network, "labels": tuple(network["labels"])})
-        )
-
-    return load_network(path, "classifier", build)
+    return load_network(path, "classifier", GaitClassifier, ClassifierConfig)

@@ -289,10 +289,4 @@ def load_generator(path: Path) -> Generator:
     Raises:
         InputError: if the file is missing, damaged, or of something else.
     """
-
-    def build(network: dict[str, Any]) -> Generator:
-        return Generator(
-            GeneratorConfig(**{**network, "labels": tuple(network["labels"])})
-        )
-
-    return load_network(path, "generator", build)
+    return load_network(path, "generator", Generator, GeneratorConfig)

@@ -165,10 +165,4 @@ def load_tokenizer(path: Path) -> Tokenizer:
     Raises:
         InputError: if the file is missing, damaged, or of something else.
     """
-
-    def build(network: dict[str, Any]) -> Tokenizer:
-        return Tokenizer(
-            TokenizerConfig(**{**network, "robots": tuple(network["robots"])})
-        )
-
-    return load_network(path, "tokenizer", build)
+    return load_network(path, "tokenizer", Tokenizer, TokenizerConfig)

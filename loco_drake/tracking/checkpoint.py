@@ -59,7 +59,7 @@ def load_checkpoint(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     Raises:
         InputError: if there is none, or it is damaged.
     """
-    return load_weights(path, KIND)
+    return load_weights(path, KIND, ("sampler/plan_scores", "sampler/plan_shares"))
 
 
 def start_from(
