@@ -7,7 +7,13 @@ from typing import Any
 from rich.console import Console
 from rich.progress import Progress
 
-from loco_drake.cli.output import print_failed, print_figures, write_results
+from loco_drake.cli.output import (
+    MARK,
+    print_failed,
+    print_figures,
+    print_warnings,
+    write_results,
+)
 from loco_drake.common.errors import check_at_least, check_choice
 
 
@@ -35,11 +41,15 @@ class EvaluateRetargeting:
     """As in every evaluation; retargeting is not random, so one seed says it all."""
     seed: int = 0
     """As in every command; nothing here is random."""
+    strict: bool = False
+    """Exits with status 1 if a figure of a clip is outside its bound."""
     json: Path | None = None
     """Writes the figures to this file."""
 
     def run(self) -> int:
-        """Prints a table for each robot; returns 1 if a clip failed, else 0.
+        """Prints a table for each robot; returns the exit status.
+
+        It is 1 if a clip failed, or is outside its bounds with --strict, else 0.
 
         Raises:
             InputError: if an option is wrong.
@@ -49,7 +59,7 @@ class EvaluateRetargeting:
         from loco_drake.evaluation.retargeting import score_segments, summarize
         from loco_drake.models.robot_files import is_robot_file, load_robot
         from loco_drake.models.robots import ROBOTS
-        from loco_drake.retargeting.variants import Variant
+        from loco_drake.retargeting.scaling import Variant
 
         if not is_robot_file(self.robot):
             check_choice("robot", self.robot, (*ROBOTS, "all"))
@@ -76,12 +86,18 @@ class EvaluateRetargeting:
                 "all of these": result["all"],
                 **result["other"],
             }
+            rows = {
+                label + MARK * bool(row["clips_outside_bounds"]): row
+                for label, row in rows.items()
+            }
             print_figures(title, "label", _COLUMNS, rows)
+            print_warnings(result["warnings"])
         failed = [
             item for result in robots.values() for item in result["failed"].items()
         ]
         print_failed(failed)
-        return 1 if failed else 0
+        doubtful = any(result["warnings"] for result in robots.values())
+        return 1 if failed or (self.strict and doubtful) else 0
 
 
 # Title: key, factor, digits.

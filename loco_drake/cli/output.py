@@ -74,3 +74,21 @@ def print_failed(failed: Iterable[tuple[str, str]]) -> None:
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     for name, error in failed:
         console.print(f"Failed: {name}: {error}", markup=False)
+
+
+# Behind the name of a row whose figures are outside their bounds.
+MARK = " (!)"
+
+
+def print_warnings(warnings: Mapping[str, Sequence[str]]) -> None:
+    """Says under a table and on stderr which clips are outside their bounds, and why.
+
+    Args:
+        warnings: sentences by clip; nothing is printed if there is none.
+    """
+    if not warnings:
+        return
+    print(f"(!) Outside their bounds, see the warnings: {len(warnings)}")
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    for name, sentences in warnings.items():
+        console.print(f"Warning: {name}: {'; '.join(sentences)}", markup=False)

@@ -9,7 +9,13 @@ import tyro
 from rich.console import Console
 from rich.progress import Progress
 
-from loco_drake.cli.output import print_failed, print_table, write_json
+from loco_drake.cli.output import (
+    MARK,
+    print_failed,
+    print_table,
+    print_warnings,
+    write_json,
+)
 from loco_drake.common.errors import InputError, check_at_least, check_choice
 from loco_drake.motion.gaits import LABELS
 
@@ -62,13 +68,17 @@ class Retarget:
     """Processes."""
     data_dir: Path | None = None
     """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
+    strict: bool = False
+    """Exits with status 1 if a figure of a clip is outside its bound."""
     json: Path | None = None
     """Writes the figures of each clip to this file."""
     seed: int = 0
     """Which recordings are for validation, and which trajectories are cut."""
 
     def run(self) -> int:
-        """Writes the files and prints the table; returns 1 if a clip failed, else 0.
+        """Writes the files and prints the table; returns the exit status.
+
+        It is 1 if a clip failed, or is outside its bounds with --strict, else 0.
 
         Raises:
             InputError: if an option is wrong, or FILE cannot be retargeted.
@@ -76,7 +86,7 @@ class Retarget:
         from loco_drake.datasets.registry import DATASETS
         from loco_drake.models.robot_files import load_robot
         from loco_drake.retargeting.batch import retarget_segments
-        from loco_drake.retargeting.variants import Variant
+        from loco_drake.retargeting.scaling import Variant
 
         robot = load_robot(self.robot)
         check_at_least("trajectories", self.trajectories, 0)
@@ -101,10 +111,16 @@ class Retarget:
         rows = [_row(outcome) for outcome in outcomes if outcome.report is not None]
         title = f"Motion files in {out}: {len(rows)}{', mirrored' * self.mirror}"
         print_table(title, list(_COLUMNS), rows)
+        doubtful = {
+            o.segment.name: o.report.warnings
+            for o in outcomes
+            if o.report is not None and o.report.warnings
+        }
+        print_warnings(doubtful)
         if split is not None and self.trajectories:
             self._cut(outcomes, split, out.parent / f"{out.name}-trajectories")
         print_failed((o.segment.name, str(o.error)) for o in failed)
-        return 1 if failed else 0
+        return 1 if failed or (self.strict and doubtful) else 0
 
     def _cut(self, outcomes: "list[Outcome]", split: "Split", folder: Path) -> None:
         from loco_drake.datasets.split import TRAIN, VALIDATION
@@ -187,7 +203,7 @@ _COLUMNS = {
 
 def _row(outcome: "Outcome") -> list[str]:
     figures = _figures(outcome)
-    row = [outcome.segment.name]
+    row = [outcome.segment.name + MARK * bool(figures["warnings"])]
     for column, key in list(_COLUMNS.items())[1:]:
         value = figures[key]
         if isinstance(value, float):

@@ -38,7 +38,7 @@ from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.quality import stance_slip_speeds, toe_trajectories
 from loco_drake.retargeting.batch import SegmentRetargeter
 from loco_drake.retargeting.retarget import RetargetReport
-from loco_drake.retargeting.variants import AS_RECORDED, Variant
+from loco_drake.retargeting.scaling import AS_RECORDED, Variant
 
 Array = NDArray[np.float64]
 
@@ -132,7 +132,8 @@ def summarize(scores: Sequence[ClipScore | FailedClip]) -> dict[str, Any]:
     Returns:
         What ``loco-drake evaluate retargeting`` writes for a robot: "labels", "all",
         "frames_per_second", "failed", and "other" for labels that are not among the
-        fifteen, which "all" leaves out.
+        fifteen, which "all" leaves out; "warnings" has sentences by clip, see
+        :mod:`loco_drake.retargeting.bounds`.
     """
     names = [str(label) for label in LABELS]
     by_label: dict[str, list[ClipScore]] = {}
@@ -148,6 +149,11 @@ def summarize(scores: Sequence[ClipScore | FailedClip]) -> dict[str, Any]:
         "labels": {name: figures(by_label[name]) for name in names if name in by_label},
         "all": figures(known),
         "frames_per_second": frames / seconds if done else None,
+        "warnings": {
+            clip.segment.name: clip.report.warnings
+            for clip in done
+            if clip.report.warnings
+        },
         "other": {k: figures(v) for k, v in by_label.items() if k not in names},
         "failed": {
             score.segment.name: score.error
@@ -185,6 +191,7 @@ def figures(clips: Sequence[ClipScore]) -> dict[str, Any]:
         values = [getattr(fidelity, key) for fidelity in fidelities]
         result[key] = float(np.mean(values)) if values else None
     result["clips"] = len(clips)
+    result["clips_outside_bounds"] = sum(bool(r.warnings) for r in reports)
     result["clips_of_three_strides"] = len(fidelities)
     result["worst"] = _worst_clips(clips)
     reasons = []

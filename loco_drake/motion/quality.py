@@ -77,6 +77,18 @@ def joint_speed_ratio_max(joints: Array, robot: Quadruped, fps: float) -> float:
     return float((speeds / robot.joint_speed_limits).max())
 
 
+def toes_in_place_share(joints: Array, robot: Quadruped) -> float:
+    """Returns the share of frames in which the worst toe is where its name says.
+
+    A left toe is left of the trunk's middle, a right one right of it, and a front toe
+    ahead of the rear one on its side.
+    """
+    p_BF = robot.toe_positions(joints)
+    beside = p_BF[..., 1] * np.array([1.0, -1.0, 1.0, -1.0]) > 0
+    ahead = p_BF[:, :2, 0] > p_BF[:, 2:, 0]
+    return float(min(beside.mean(axis=0).min(), ahead.mean(axis=0).min()))
+
+
 def distance_rmse(a: Array, b: Array) -> float:
     """Returns the root of the mean squared Euclidean distance of points (..., 3)."""
     return float(np.sqrt(((a - b) ** 2).sum(axis=-1).mean()))

@@ -17,8 +17,8 @@ from loco_drake.motion.motion import FPS, Motion
 from loco_drake.motion.motion_file import save_motion
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import RetargetReport, retarget_clip
+from loco_drake.retargeting.scaling import AS_RECORDED, Variant
 from loco_drake.retargeting.trajectories import Stretch
-from loco_drake.retargeting.variants import AS_RECORDED, Variant
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from loco_drake.common.runs import intervals
 from loco_drake.motion.keypoints import KeypointClip
-from loco_drake.retargeting.smoothing import smooth
+from loco_drake.retargeting.correction import smooth
 from loco_drake.retargeting.source_config import ContactConfig
 
 Array = NDArray[np.float64]

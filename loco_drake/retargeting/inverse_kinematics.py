@@ -1,5 +1,7 @@
 """Joint angles for given toes, by Drake's InverseKinematics."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.multibody.inverse_kinematics import InverseKinematics
@@ -18,6 +20,18 @@ TOLERANCE = 1e-5
 _REST = 1e-3
 
 
+class Solution(NamedTuple):
+    """Joints of T frames.
+
+    Attributes:
+        joints: rad, shape (T, J).
+        solved: in which frames the solver says that they are right, shape (T,).
+    """
+
+    joints: Array
+    solved: NDArray[np.bool_]
+
+
 class LegSolver:
     """Solves frame after frame of one robot, each starting from the one before.
 
@@ -25,6 +39,9 @@ class LegSolver:
     built once: bounds and costs are all that change. Solving it finds joints within
     ``TOLERANCE`` of the targets, within the position limits, and as near to the frame
     before as the speed limits ask.
+
+    Attributes:
+        options: of the solver.
     """
 
     def __init__(self, robot: Quadruped, fps: float):
@@ -43,8 +60,8 @@ class LegSolver:
             for joint in robot.joint_names
         ]
         self._solver = SnoptSolver()
-        self._options = SolverOptions()
-        self._options.SetOption(self._solver.id(), "Major feasibility tolerance", 1e-7)
+        self.options = SolverOptions()
+        self.options.SetOption(self._solver.id(), "Major feasibility tolerance", 1e-7)
 
         ik = InverseKinematics(self._plant, with_joint_limits=False)
         self._prog, self._q = ik.prog(), ik.q()[self._order]
@@ -60,43 +77,56 @@ class LegSolver:
             np.eye(len(self._order)), np.zeros(len(self._order)), self._q
         )
 
-    def solve(self, p_BF: Array) -> Array:
+    def solve(self, p_BF: Array) -> Solution:
         """Returns joints (T, J) in rad for toes ``p_BF`` (T, 4, 3) in m.
 
         Where a toe cannot be reached within the limits of position and speed, it is
-        put as near to its target as they allow.
+        put as near to its target as they allow. Where the solver finds no such joints
+        either, they are the best of what it ended with, of the robot's own
+        :meth:`~.Quadruped.nearest_joints` and of the frame before.
         """
         joints = np.empty((len(p_BF), len(self._order)))
+        solved = np.ones(len(p_BF), dtype=bool)
         previous = self._robot.stand_joints
-        step = np.full(
-            len(self._order), np.inf
-        )  # the first frame may be far from the stance
+        # The first frame may be far from the stance.
+        step = np.full(len(self._order), np.inf)
         for k, p in enumerate(p_BF):
             lower = np.maximum(self._robot.joint_lower, previous - step)
             upper = np.minimum(self._robot.joint_upper, previous + step)
-            solution = self._solve_exactly(p, previous, lower, upper)
-            if solution is None:
-                solution = self._solve_nearly(p, previous, lower, upper)
-            joints[k] = np.clip(solution, lower, upper)
-            previous, step = joints[k], self._step
-        return joints
+            success, solution = self._solve_exactly(p, previous, lower, upper)
+            if not success:
+                success, solution = self._solve_nearly(p, previous, lower, upper)
+            solution = np.clip(solution, lower, upper)
+            if not success:
+                solved[k] = False
+                solution = self._best(p, solution, previous, lower, upper)
+            joints[k] = previous = solution
+            step = self._step
+        return Solution(joints, solved)
+
+    def _best(
+        self, p_BF: Array, ended: Array, previous: Array, lower: Array, upper: Array
+    ) -> Array:
+        guess = self._robot.nearest_joints(p_BF).clip(lower, upper)
+        choices = [q for q in (ended, guess, previous) if np.isfinite(q).all()]
+        errors = [
+            float(np.linalg.norm(self._robot.toe_positions(q) - p_BF)) for q in choices
+        ]
+        return choices[int(np.argmin(errors))]
 
     def _solve_exactly(
         self, p_BF: Array, previous: Array, lower: Array, upper: Array
-    ) -> Array | None:
+    ) -> tuple[bool, Array]:
         for toe, p in zip(self._toes, p_BF, strict=True):
             toe.evaluator().set_bounds(p - TOLERANCE, p + TOLERANCE)
         self._limits.evaluator().set_bounds(lower, upper)
         self._near.evaluator().UpdateCoefficients(np.eye(len(previous)), -previous)
-        result = self._solver.Solve(self._prog, previous, self._options)
-        if not result.is_success():
-            return None
-        solution: Array = result.GetSolution(self._q)
-        return solution
+        result = self._solver.Solve(self._prog, previous, self.options)
+        return result.is_success(), result.GetSolution(self._q)
 
     def _solve_nearly(
         self, p_BF: Array, previous: Array, lower: Array, upper: Array
-    ) -> Array:
+    ) -> tuple[bool, Array]:
         """Minimises the toes' distances; built anew, since it is rarely needed."""
         ik = InverseKinematics(self._plant, with_joint_limits=False)
         prog, q = ik.prog(), ik.q()[self._order]
@@ -106,6 +136,5 @@ class LegSolver:
             ik.AddPositionCost(world, p, foot, np.zeros(3), 1e6 * np.eye(3))
         prog.AddQuadraticErrorCost(_REST * np.eye(len(previous)), previous, q)
         prog.AddBoundingBoxConstraint(lower, upper, q)
-        result = self._solver.Solve(prog, previous, self._options)
-        solution: Array = result.GetSolution(q)
-        return solution
+        result = self._solver.Solve(prog, previous, self.options)
+        return result.is_success(), result.GetSolution(q)

@@ -1,35 +1,30 @@
 """One recording of an animal -> one Motion of a robot."""
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
-from loco_drake.common.rotations import quat_rotate
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion import quality
 from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.motion.motion import FPS, Motion, make_motion
+from loco_drake.retargeting.bounds import outside_bounds
 from loco_drake.retargeting.contacts import detect_contacts, resample_contacts
-from loco_drake.retargeting.feet import plant_feet
+from loco_drake.retargeting.correction import correct
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.scaling import (
-    Targets,
-    resample,
-    scale_to_robot,
-    stance_height,
-)
-from loco_drake.retargeting.smoothing import smooth
-from loco_drake.retargeting.source_config import RetargetConfig, load_config
-from loco_drake.retargeting.trunk import raise_trunk
-from loco_drake.retargeting.variants import (
     AS_RECORDED,
     Variant,
+    frames_on_feet,
     in_time,
+    on_feet,
+    resample,
+    scale_to_robot,
     smoothing_in_time,
+    stance_height,
+    track_width,
 )
+from loco_drake.retargeting.source_config import RetargetConfig, load_config
 
 
 @dataclass(frozen=True)
@@ -49,6 +44,14 @@ class RetargetReport:
         scale: the robot's stance height over the animal's.
         time_scale: how long the motion lasts, over the recording.
         mirrored: whether left and right are exchanged.
+        on_feet_share: share of the recording's frames in which the animal is on its
+            feet; None where the source's configuration says how high it stands.
+        on_feet_frames: those frames, in the recording's numbers, such as "240-420".
+        toes_in_place_share: share of the frames in which a toe is on its own side of
+            the trunk, and a front toe ahead of the rear one, of the worst toe.
+        source_track_m: how far left of the right toes the recording's left ones are.
+        unsolved_frames: for which inverse kinematics found no solution.
+        warnings: a sentence for each figure outside its bound, see :mod:`.bounds`.
     """
 
     frames: int
@@ -63,6 +66,12 @@ class RetargetReport:
     scale: float
     time_scale: float
     mirrored: bool
+    on_feet_share: float | None
+    on_feet_frames: str | None
+    toes_in_place_share: float
+    source_track_m: float
+    unsolved_frames: int
+    warnings: tuple[str, ...] = ()
 
 
 def retarget_clip(
@@ -98,7 +107,7 @@ def retarget_clip(
     formula = scale_to_robot(resampled, height, robot, config)
     contacts = resample_contacts(raw_contacts, timed.fps, FPS, len(resampled))
     targets = correct(formula, contacts, robot, smoothing_in_time(config, time_scale))
-    joints = solver.solve(targets.p_BF)
+    joints, solved = solver.solve(targets.p_BF)
     motion = make_motion(
         robot=robot.name,
         label=GaitLabel(clip.source, clip.gait),
@@ -111,6 +120,7 @@ def retarget_clip(
     )
     seconds = time.perf_counter() - began
     p_WF = quality.toe_trajectories(motion, robot)
+    standing = None if config.stance_height is not None else on_feet(clip)
     report = RetargetReport(
         frames=len(motion),
         frames_per_second=len(motion) / seconds,
@@ -124,41 +134,15 @@ def retarget_clip(
         scale=scale,
         time_scale=time_scale,
         mirrored=variant.mirror,
+        on_feet_share=None if standing is None else float(standing.mean()),
+        on_feet_frames=None if standing is None else frames_on_feet(clip, standing),
+        toes_in_place_share=quality.toes_in_place_share(joints, robot),
+        source_track_m=track_width(clip),
+        unsolved_frames=int((~solved).sum()),
     )
+    report = replace(report, warnings=outside_bounds(asdict(report), robot))
     kept = ("scale", "toe_error_rmse_m", "correction_rmse_m")
     figures = {name: f"{getattr(report, name):.6g}" for name in kept}
+    if report.warnings:
+        figures["warnings"] = "; ".join(report.warnings)
     return replace(motion, provenance={**motion.provenance, **figures}), report
-
-
-def correct(
-    formula: Targets,
-    contacts: NDArray[np.bool_],
-    robot: Quadruped,
-    config: RetargetConfig,
-) -> Targets:
-    """Returns targets at 50 Hz that a robot can follow, near to the formula's.
-
-    Trunk and toes move smoothly, toes in contact stand still on the ground, those that
-    swing stay above it, none is nearer or further than its leg reaches, and the trunk
-    is high enough for the legs to fold and the knees to clear the ground.
-    """
-    smoothing = config.smoothing
-    targets = Targets(
-        p_WB=smooth(formula.p_WB, smoothing.base, FPS),
-        yaw=smooth(formula.yaw, smoothing.base, FPS),
-        pitch=smooth(formula.pitch, smoothing.base, FPS),
-        p_WF=plant_feet(formula.p_WF, contacts, robot.foot_radius, smoothing.toes, FPS),
-    )
-    return within_reach(raise_trunk(targets, robot, FPS), robot)
-
-
-def within_reach(targets: Targets, robot: Quadruped) -> Targets:
-    """Returns ``targets`` with toes that the joints' limits do not allow moved nearer.
-
-    How is the robot's own affair, see :mod:`loco_drake.models.quadruped`.
-    """
-    p_BF = targets.p_BF
-    reachable = robot.reachable_toes(p_BF)
-    beyond = np.linalg.norm(reachable - p_BF, axis=-1, keepdims=True) > 1e-9
-    p_WF = targets.p_WB[:, None] + quat_rotate(targets.q_WB[:, None], reachable)
-    return replace(targets, p_WF=np.where(beyond, p_WF, targets.p_WF))

@@ -19,9 +19,19 @@ where d is the unit vector from hip to withers, s the horizontal one to its left
 the one from A to T. The robot's virtual hip V is its thigh joint at zero abduction (or
 above the toe of its stance, where the legs have other joints), so that an animal whose
 toes fall under its virtual hips stands with the robot's legs straight down.
+
+By default a robot keeps the animal's timing, as in the paper, so that a small robot
+moves like a large animal in slow motion. Two bodies, small and large, move alike
+dynamically if their Froude numbers v^2 / (g h) are equal (Alexander and Jayes 1983, "A
+dynamic similarity hypothesis for the gaits of quadrupedal mammals"): with lengths alpha
+times those of the animal, times are sqrt(alpha) times its own, and so are speeds. Noise
+and the thresholds of a contact are the recording's and so belong to the animal's clock:
+contacts are found before the clock is changed, and cut-off frequencies change with it.
+The clearance of a swing and the limits of the joints are the robot's.
 """
 
 from dataclasses import dataclass, replace
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,11 +44,25 @@ from loco_drake.common.rotations import (
     quat_rotate,
     yaw_quat,
 )
+from loco_drake.common.runs import intervals
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.retargeting.source_config import RetargetConfig
 
 Array = NDArray[np.float64]
+
+# An animal is on its feet where the heights of withers and hip, over the distances of
+# their toes, are above UPRIGHT, the legs are longer than UNFOLDED of the longest they
+# are, and the trunk's height is above OFF_THE_GROUND of its length. In the stretches of
+# dog and horse the least are .82 (a gallop), .74 (a canter) and .95. Of a dog that sits
+# the hip is at .3; of one that lies both are at .1 to .6, and it is at .1 to .45 of its
+# length.
+UPRIGHT, UNFOLDED, OFF_THE_GROUND = 0.75, 0.65, 0.45
+# Withers and hip differ in height by less than this of the trunk's length; .26 there.
+STEEP = 0.6
+LEAST_STANDING = 0.2  # s
+
+_MOST_RUNS = 5
 
 
 @dataclass(frozen=True)
@@ -72,22 +96,75 @@ class Targets:
         return quat_rotate(q_BW, self.p_WF - self.p_WB[:, None])
 
 
+def on_feet(clip: KeypointClip) -> NDArray[np.bool_]:
+    """Returns in which frames the animal is on its feet, shape (T,).
+
+    There withers and hip are both nearly as high as they are far from their toes, the
+    legs are not folded, and the trunk is neither on the ground nor steep. An animal
+    that sits has its hip low, one that lies its legs folded or beside it.
+    """
+    front = np.linalg.norm(clip.toes[:, :2] - clip.withers[:, None], axis=-1).mean(1)
+    rear = np.linalg.norm(clip.toes[:, 2:] - clip.hip[:, None], axis=-1).mean(1)
+    height = (clip.withers[:, 2] + clip.hip[:, 2]) / 2
+    trunk = np.median(np.linalg.norm(clip.withers - clip.hip, axis=-1))
+    upright = (
+        (clip.withers[:, 2] > UPRIGHT * front)
+        & (clip.hip[:, 2] > UPRIGHT * rear)
+        & (height > OFF_THE_GROUND * trunk)
+        & (np.abs(clip.withers[:, 2] - clip.hip[:, 2]) < STEEP * trunk)
+    )
+    legs = front + rear
+    longest = legs[upright].max(initial=0.0)
+    return upright & (legs > UNFOLDED * longest)
+
+
+def track_width(clip: KeypointClip) -> float:
+    """Returns how far left of the right toes the left ones are on average, m."""
+    ahead = (clip.withers - clip.hip)[:, :2]
+    left = np.stack((-ahead[:, 1], ahead[:, 0]), axis=-1)
+    left = left / np.maximum(np.linalg.norm(left, axis=-1, keepdims=True), 1e-9)
+    apart = (clip.toes[:, 0::2] - clip.toes[:, 1::2])[..., :2].mean(axis=1)
+    return float((apart * left).sum(axis=-1).mean())
+
+
+def frames_on_feet(clip: KeypointClip, standing: NDArray[np.bool_]) -> str:
+    """Returns those frames in the numbers of the recording, such as "240-420"."""
+    first = int(clip.provenance.get("frames", "0").split("-")[0])
+    runs = [f"{first + start}-{first + end}" for start, end in intervals(standing)]
+    if len(runs) > _MOST_RUNS:
+        runs = [*runs[:_MOST_RUNS], f"{len(runs) - _MOST_RUNS} more"]
+    return ", ".join(runs)
+
+
 def stance_height(clip: KeypointClip, config: RetargetConfig) -> float:
     """Returns the animal's stance height in m: of the middle of withers and hip.
 
-    It is that of the configuration, or else a percentile over the clip.
+    It is that of the configuration, or else a percentile over the frames in which the
+    animal is on its feet.
 
     Raises:
-        InputError: if the middle lies below the ground.
+        InputError: if the middle lies below the ground, or the animal is on its feet in
+            too few frames to tell its size, naming these.
     """
     middle = (clip.withers[:, 2] + clip.hip[:, 2]) / 2
-    height = float(np.percentile(middle, config.stance_height_percentile))
-    if height <= 0:
+    lowest = float(np.percentile(middle, config.stance_height_percentile))
+    if lowest <= 0:
         raise InputError(
-            f"The middle of withers and hip lies {height:.3g} m over the ground, "
+            f"The middle of withers and hip lies {lowest:.3g} m over the ground, "
             "so this is no clip of an animal on its feet."
         )
-    return height if config.stance_height is None else config.stance_height
+    if config.stance_height is not None:
+        return config.stance_height
+    standing = on_feet(clip)
+    if not standing.all() and standing.sum() < LEAST_STANDING * clip.fps:
+        where = frames_on_feet(clip, standing)
+        raise InputError(
+            "The animal is on its feet in "
+            + (f"no frames but {where}" if where else "no frame")
+            + ", too few to tell how high it stands: its withers and hip must be over "
+            "its toes for its size to be known."
+        )
+    return float(np.percentile(middle[standing], config.stance_height_percentile))
 
 
 def resample(clip: KeypointClip, fps: float) -> KeypointClip:
@@ -139,3 +216,56 @@ def scale_to_robot(
     lift = config.swing_height * alpha * np.maximum(clip.toes[..., 2], 0.0)
     p_WF[..., 2] = robot.foot_radius + lift
     return replace(base, p_WF=p_WF)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What is to be changed of a recording; by default nothing.
+
+    Attributes:
+        mirror: whether left and right are exchanged.
+        froude: whether time is scaled for the animal's Froude number.
+    """
+
+    mirror: bool = False
+    froude: bool = False
+
+    @property
+    def suffix(self) -> str:
+        """What tells a folder of such motion from others: "-mirrored-froude"."""
+        return "-mirrored" * self.mirror + "-froude" * self.froude
+
+    def time_scale(self, scale: float) -> float:
+        """Returns how long the motion lasts, over the recording.
+
+        Args:
+            scale: the robot's stance height over the animal's.
+        """
+        return sqrt(scale) if self.froude else 1.0
+
+    def apply(self, clip: KeypointClip, scale: float) -> KeypointClip:
+        """Returns the clip in the robot's time, mirrored where that is asked for."""
+        clip = clip.mirrored() if self.mirror else clip
+        return in_time(clip, self.time_scale(scale))
+
+
+AS_RECORDED = Variant()
+
+
+def in_time(clip: KeypointClip, time_scale: float) -> KeypointClip:
+    """Returns the clip with a clock on which it lasts ``time_scale`` times as long."""
+    return replace(
+        clip,
+        fps=clip.fps / time_scale,
+        provenance={**clip.provenance, "time_scale": f"{time_scale:.6g}"},
+    )
+
+
+def smoothing_in_time(config: RetargetConfig, time_scale: float) -> RetargetConfig:
+    """Returns the configuration with the cut-offs of that clock, in Hz."""
+    smoothing = replace(
+        config.smoothing,
+        base=config.smoothing.base / time_scale,
+        toes=config.smoothing.toes / time_scale,
+    )
+    return replace(config, smoothing=smoothing)

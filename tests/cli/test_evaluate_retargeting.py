@@ -1,5 +1,6 @@
 import json
 
+import numpy as np
 import pytest
 import tyro
 
@@ -89,3 +90,32 @@ def test_wrong_input_raises_one_sentence(made_data, tmp_path):
     for arguments, reason in wrong.items():
         with pytest.raises(InputError, match=reason):
             command(*arguments).run()
+
+
+def test_clips_outside_their_bounds_are_marked_and_strict_fails(
+    made_data, tmp_path, capsys
+):
+    """A pace whose left and right toes are exchanged, beside one that is right."""
+    (tmp_path / "dog_mann" / "keypoints").mkdir(parents=True)
+    rows = np.loadtxt(made_data / "dog_mann/keypoints/made_pace.txt", delimiter=",")
+    folder = tmp_path / "dog_mann" / "keypoints"
+    np.savetxt(folder / "good.txt", rows, delimiter=",", fmt="%.5f")
+    points = rows.reshape(len(rows), 27, 3)
+    points[:, [10, 15, 19, 23]] = points[:, [15, 10, 23, 19]]
+    np.savetxt(folder / "bad.txt", rows, delimiter=",", fmt="%.5f")
+    head = (made_data / "segments.csv").read_text().splitlines()[0]
+    stretches = [
+        f"dog_mann,keypoints/{name}.txt,pace,0,240,60,1," for name in ("good", "bad")
+    ]
+    (tmp_path / "segments.csv").write_text("\n".join([head, *stretches, ""]))
+    options = ("--data-dir", tmp_path, "--json", tmp_path / "a.json")
+    for strict, status in (((), 0), (("--strict",), 1)):
+        assert command(*options, *strict).run() == status
+        printed = capsys.readouterr()
+        assert "dog-pace (!)" in printed.out
+        bad = "dog-pace-bad-0-240"
+        assert printed.err.count(f"Warning: {bad}: distance of the recording's") == 1
+        assert "good" not in printed.err
+        result = json.loads((tmp_path / "a.json").read_text())["robots"]["go2"]
+        assert list(result["warnings"]) == [bad]
+        assert result["labels"]["dog-pace"]["clips_outside_bounds"] == 1

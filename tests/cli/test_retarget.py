@@ -1,5 +1,6 @@
 import json
 
+import numpy as np
 import pytest
 import tyro
 
@@ -251,3 +252,53 @@ def test_file_of_another_source_leaves_nothing_behind(tmp_path):
     with pytest.raises(InputError, match="is not a solo8 keypoint file"):
         command(file, *options).run()
     assert not (tmp_path / "out").exists()
+
+
+def test_dog_that_lies_before_it_trots_is_warned_of(made_data, tmp_path, capsys):
+    """Four seconds .34 m lower: the scale is the standing dog's all the same.
+
+    The file is written, --strict or not; that only decides the exit status.
+    """
+    rows = np.loadtxt(made_data / "dog_mann/keypoints/made_trot.txt", delimiter=",")
+    low = np.repeat(rows[:1], 240, axis=0).reshape(240, 27, 3)
+    low[..., 1] -= 0.34 * (low[..., 1] > 0.35)
+    rows = np.concatenate((low.reshape(240, -1), rows))
+    np.savetxt(tmp_path / "lies.txt", rows, delimiter=",", fmt="%.5f")
+    file = (tmp_path / "lies.txt", "--source", "dog", "--gait", "trot")
+    to = ("--out", tmp_path, "--json", tmp_path / "a.json")
+    name = "dog-trot-lies-0-480"
+    for strict, status in (((), 0), (("--strict",), 1)):
+        assert command(*file, *to, *strict).run() == status
+        (figures,) = json.loads((tmp_path / "a.json").read_text()).values()
+        scale = get_robot("go2").stand_height / 0.44
+        assert figures["scale"] == pytest.approx(scale, rel=1e-3)
+        assert figures["on_feet_frames"] == "240-480"
+        printed = capsys.readouterr()
+        assert f"{name} (!)" in printed.out
+        assert "(!) Outside their bounds, see the warnings: 1" in printed.out
+        warning = f"Warning: {name}: frames on its feet 50 % (240-480), not at least 95"
+        assert warning in printed.err
+        motion = load_motion(tmp_path / f"{name}.npz")
+        assert motion.provenance["warnings"] == "; ".join(figures["warnings"])
+
+
+def test_good_clips_pass_strict_without_a_word(made_data, tmp_path, capsys):
+    options = ("--data-dir", made_data, "--gait", "trot", "--trajectories", 0)
+    assert command(*options, "--out", tmp_path, "--strict").run() == 0
+    printed = capsys.readouterr()
+    assert "Warning" not in printed.out + printed.err
+    assert "(!)" not in printed.out
+
+
+def test_data_without_one_of_the_fifteen_gaits_says_how_to_retarget_it(
+    made_data, tmp_path
+):
+    """An empty table would look like success."""
+    (tmp_path / "dog_mann").symlink_to(made_data / "dog_mann")
+    head = (made_data / "segments.csv").read_text().splitlines()[0]
+    row = "dog_mann,keypoints/made_pace.txt,walk,0,200,60,1,"
+    (tmp_path / "segments.csv").write_text(f"{head}\n{row}\n")
+    with pytest.raises(InputError, match="only dog-walk: name what to take with --gait walk"):
+        command("--data-dir", tmp_path, "--out", tmp_path).run()
+    walk = ("--data-dir", tmp_path, "--gait", "walk", "--out", tmp_path)
+    assert command(*walk, "--trajectories", 0).run() == 0

@@ -67,8 +67,8 @@ def test_what_is_above_the_trunk_does_not_matter(tmp_path, plain, name):
     p_BF = plain.toe_positions(joints)
     np.testing.assert_allclose(robot.toe_positions(joints), p_BF, atol=1e-12)
     assert robot.stand_height == pytest.approx(plain.stand_height)
-    found = LegSolver(robot, FPS).solve(p_BF)
-    np.testing.assert_allclose(found, LegSolver(plain, FPS).solve(p_BF), atol=1e-9)
+    found, expected = (LegSolver(r, FPS).solve(p_BF).joints for r in (robot, plain))
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def test_clip_becomes_the_same_motion_under_a_floating_joint(tmp_path, plain, dog_clip):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from loco_drake.common.runs import intervals
-from loco_drake.retargeting.feet import CLEARANCE, plant_feet, swing_clearance
+from loco_drake.retargeting.correction import CLEARANCE, plant_feet, swing_clearance
 
 FPS, RADIUS, CUTOFF = 50.0, 0.02, 7.0
 

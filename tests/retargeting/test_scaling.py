@@ -1,12 +1,23 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from loco_drake.common.errors import InputError
+from loco_drake.datasets.registry import read_clip
+from loco_drake.datasets.segments import read_segments
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.keypoints import KeypointClip
-from loco_drake.retargeting.scaling import resample, scale_to_robot, stance_height
+from loco_drake.retargeting.scaling import (
+    frames_on_feet,
+    on_feet,
+    resample,
+    scale_to_robot,
+    stance_height,
+)
 from loco_drake.retargeting.source_config import RetargetConfig
+from tests.synthetic import make_dog
 
 
 def clip_of(withers, hip, toes, fps=50.0):
@@ -103,14 +114,98 @@ def test_heading_has_no_jumps_when_the_animal_turns_round():
 
 
 def test_stance_height_is_the_percentile_of_the_middle_or_that_of_the_source():
-    clip = clip_of([[0, 0, 0.5], [0, 0, 0.6]], [[-1, 0, 0.3]] * 2, np.zeros((2, 4, 3)))
+    under = [[0, 0.1, 0], [0, -0.1, 0], [-1, 0.1, 0], [-1, -0.1, 0]]
+    clip = clip_of([[0, 0, 0.7], [0, 0, 0.8]], [[-1, 0, 0.5]] * 2, [under] * 2)
     lowest = RetargetConfig(stance_height_percentile=0.0)
-    assert stance_height(clip, lowest) == pytest.approx(0.40)
-    assert stance_height(clip, RetargetConfig()) == pytest.approx(0.425)
+    assert stance_height(clip, lowest) == pytest.approx(0.60)
+    assert stance_height(clip, RetargetConfig()) == pytest.approx(0.625)
     assert stance_height(clip, RetargetConfig(stance_height=0.3)) == 0.3
     sunk = clip_of([[0, 0, -1]], [[-1, 0, 0.3]], np.zeros((1, 4, 3)))
     with pytest.raises(InputError, match="no clip of an animal on its feet"):
         stance_height(sunk, RetargetConfig(stance_height=0.3))
+
+
+def walk_after(pose, frames):
+    """The made dog's trot, .44 m high, after so many frames of another pose at 60 Hz.
+
+    Args:
+        pose: changes withers, hip and toes, (T, 3), (T, 3) and (T, 4, 3), in place.
+        frames: how many.
+    """
+    dog = make_dog("trot", seconds=2.0)
+    walks = (dog.withers, dog.hip, dog.toes)
+    arrays = [np.repeat(points[:1], frames, axis=0) for points in walks]
+    pose(*arrays)
+    joined = (np.concatenate(pair) for pair in zip(arrays, walks, strict=True))
+    return clip_of(*joined, fps=60.0)
+
+
+def lies(withers, hip, toes):
+    withers[:, 2], hip[:, 2] = 0.10, 0.12
+
+
+def lies_on_folded_legs(withers, hip, toes):
+    """Toes right below: legs are as high as they are long, but short."""
+    lies(withers, hip, toes)
+    toes[:, :2, 0], toes[:, 2:, 0] = withers[:, :1], hip[:, :1]
+
+
+def lies_flat(withers, hip, toes):
+    withers[:, 2], hip[:, 2] = 0.05, 0.05
+    toes[..., 1] *= 10
+
+
+def sits(withers, hip, toes):
+    """The hip at 8 cm, the withers as high as ever."""
+    hip[:, 2] = 0.08
+    toes[:, 2:, 0] += 0.2
+
+
+def rears(withers, hip, toes):
+    """Front toes off the ground, the withers above the hip."""
+    withers[:, 2] += 0.4
+    toes[:, :2] = withers[:, None] + [0.3, 0.0, -0.1]
+
+
+@pytest.mark.parametrize("pose", [lies, lies_on_folded_legs, lies_flat, sits, rears])
+def test_scale_is_that_of_the_animal_standing(pose):
+    """Three seconds of another pose, two of a trot: its .44 m count."""
+    clip = walk_after(pose, 180)
+    standing = on_feet(clip)
+    assert not standing[:180].any()
+    assert standing[180:].all()
+    assert frames_on_feet(clip, standing) == "180-300"
+    assert stance_height(clip, RetargetConfig()) == pytest.approx(0.44)
+
+
+@pytest.mark.parametrize("pose", [lies, lies_on_folded_legs, lies_flat, sits])
+def test_animal_that_hardly_stands_is_refused_with_its_frames(pose):
+    """Eleven frames at 60 Hz are less than .2 s, twelve are not."""
+    for frames, reason in ((0, "in no frame, too"), (11, "no frames but 520-531, too")):
+        clip = walk_after(pose, 20)
+        keep = slice(0, 20 + frames)
+        arrays = (points[keep] for points in (clip.withers, clip.hip, clip.toes))
+        short = replace(clip_of(*arrays, fps=60.0), provenance={"frames": "500-531"})
+        with pytest.raises(InputError, match=reason):
+            stance_height(short, RetargetConfig())
+        # A source that says how high its body stands is not asked.
+        assert stance_height(short, RetargetConfig(stance_height=0.3)) == 0.3
+
+
+def test_recorded_stretches_are_all_on_their_feet(real_data):
+    """So their scale is that of all their frames, as it always was."""
+    for segment in read_segments(real_data)[::5]:
+        if segment.source in ("dog", "horse"):
+            assert on_feet(segment.read()).all(), segment.name
+
+
+def test_whole_recordings_have_the_scale_of_their_stretches(real_data):
+    """In these the dog sits for most of the time: medians were .23 and .32 m."""
+    for name, height in (("dog_run00", 0.454), ("dog_turn00", 0.442)):
+        path = real_data / "dog_mann" / "keypoints" / f"{name}.txt"
+        clip = read_clip("dog", path, gait="trot")
+        found = stance_height(clip, RetargetConfig())
+        assert found == pytest.approx(height, abs=0.002)
 
 
 def test_resampling_keeps_a_cubic_exactly_and_the_last_whole_step():

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from loco_drake.retargeting.smoothing import smooth
+from loco_drake.retargeting.correction import smooth
 
 
 @pytest.mark.parametrize(("frequency", "gain"), [(1.0, 1.0), (5.0, 0.5), (20.0, 0.0)])

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from loco_drake.motion.motion import FPS
-from loco_drake.retargeting.retarget import within_reach
-from loco_drake.retargeting.scaling import Targets
-from loco_drake.retargeting.trunk import (
+from loco_drake.retargeting.correction import (
     FOLD_MARGIN,
     KNEE_CLEARANCE,
     raise_trunk,
+    within_reach,
 )
+from loco_drake.retargeting.scaling import Targets
 
 
 def standing(robot, height, ahead=0.0, frames=100):

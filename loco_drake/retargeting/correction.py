@@ -1,0 +1,254 @@
+"""Targets near the formula's that a robot can follow.
+
+Toes stand still in stance and swing above the ground; trunk and toes move smoothly; the
+trunk is high enough for the legs to fold and for the knees to clear the ground.
+
+*Toes.* For each leg, the trajectory nearest to the formula's whose third differences
+are small, such that the toe does not move while it is in contact. The place where a
+foot stands and the way in which it swings there are so found together, and neither
+touchdown nor lift-off has a jump:
+
+    min  sum_t |p_t - target_t|^2 + w |D p|^2
+    s.t. p_t = p_(t+1) within each contact;  p_t,z = foot_radius in contact;
+         p_t,z >= foot_radius + clearance_t in swing.
+
+*Trunk.* A robot whose knees all point backward cannot copy a low crawl of one whose
+knees point at each other: a foot far ahead of its hip takes the knee to the ground. So
+the trunk is raised where legs would fold too much or kneel.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.sparse import csc_matrix, csr_matrix, diags_array, eye_array
+from scipy.sparse.linalg import splu, spsolve
+
+from loco_drake.common.rotations import quat_rotate
+from loco_drake.common.runs import intervals
+from loco_drake.models.quadruped import Quadruped
+from loco_drake.motion.motion import FPS
+from loco_drake.retargeting.scaling import Targets
+from loco_drake.retargeting.source_config import RetargetConfig
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_ORDER = 3  # of the differences that are small
+
+# Toes swing at least this high over the ground, in m, at mid-swing; and at least as
+# high as a swing that takes off and lands with this vertical acceleration, in m/s^2.
+CLEARANCE = 0.015
+LIFT_ACCELERATION = 20.0
+
+_MAX_ROUNDS = 20
+
+# A leg in stance right under its hip is at least this much longer than fully folded.
+FOLD_MARGIN = 1.1
+# Height of the knees' axes over the ground in m: the thigh's radius and some air.
+KNEE_CLEARANCE = 0.03
+# Over this time before and after a lift the trunk rises and sinks, s.
+RAMP_SECONDS = 0.14
+
+_MAX_LIFTS = 6
+_CLOSE_ENOUGH = 0.002
+
+
+def correct(
+    formula: Targets,
+    contacts: NDArray[np.bool_],
+    robot: Quadruped,
+    config: RetargetConfig,
+) -> Targets:
+    """Returns targets at 50 Hz that a robot can follow, near to the formula's.
+
+    Trunk and toes move smoothly, toes in contact stand still on the ground, those that
+    swing stay above it, none is nearer or further than its leg reaches, and the trunk
+    is high enough for the legs to fold and the knees to clear the ground.
+    """
+    smoothing = config.smoothing
+    targets = Targets(
+        p_WB=smooth(formula.p_WB, smoothing.base, FPS),
+        yaw=smooth(formula.yaw, smoothing.base, FPS),
+        pitch=smooth(formula.pitch, smoothing.base, FPS),
+        p_WF=plant_feet(formula.p_WF, contacts, robot.foot_radius, smoothing.toes, FPS),
+    )
+    return within_reach(raise_trunk(targets, robot, FPS), robot)
+
+
+def within_reach(targets: Targets, robot: Quadruped) -> Targets:
+    """Returns ``targets`` with toes that the joints' limits do not allow moved nearer.
+
+    How is the robot's own affair, see :mod:`loco_drake.models.quadruped`.
+    """
+    p_BF = targets.p_BF
+    reachable = robot.reachable_toes(p_BF)
+    beyond = np.linalg.norm(reachable - p_BF, axis=-1, keepdims=True) > 1e-9
+    p_WF = targets.p_WB[:, None] + quat_rotate(targets.q_WB[:, None], reachable)
+    return replace(targets, p_WF=np.where(beyond, p_WF, targets.p_WF))
+
+
+def difference_matrix(frames: int) -> csc_matrix:
+    """Returns D, shape (frames - 3, frames), of third differences."""
+    rows = frames - _ORDER
+    if rows <= 0:
+        return csc_matrix((0, frames))
+    stencil = (-1.0, 3.0, -3.0, 1.0)
+    return csc_matrix(
+        diags_array(stencil, offsets=range(_ORDER + 1), shape=(rows, frames))
+    )
+
+
+def penalty(cutoff: float, fps: float) -> float:
+    """Returns the weight of squared third differences that halves ``cutoff`` Hz.
+
+    min |x - y|^2 + w |D x|^2 is the low-pass filter 1 / (1 + w (2 sin(pi f / fps))^6):
+    a Butterworth's shape, without its phase. Above half the rate nothing is smoothed.
+    """
+    if cutoff >= fps / 2:
+        return 0.0
+    return float((2 * np.sin(np.pi * cutoff / fps)) ** (-2 * _ORDER))
+
+
+def smooth(values: Array, cutoff: float, fps: float) -> Array:
+    """Returns ``values`` (T, ...) after a zero-phase low-pass along the first axis.
+
+    Whittaker's smoother: the trajectory nearest to ``values`` whose third differences
+    are small, see :func:`penalty`. Quadratics pass unchanged, also at the ends.
+    """
+    frames = len(values)
+    D = difference_matrix(frames)
+    system = eye_array(frames, format="csc") + penalty(cutoff, fps) * (D.T @ D)
+    smoothed: Array = splu(csc_matrix(system)).solve(values.reshape(frames, -1))
+    return smoothed.reshape(values.shape)
+
+
+def plant_feet(
+    p_WF: Array, contacts: Bools, foot_radius: float, cutoff: float, fps: float
+) -> Array:
+    """Returns toe trajectories that stand still in contact and swing above the ground.
+
+    Args:
+        p_WF: the formula's targets in m, shape (T, 4, 3).
+        contacts: whether each toe is on the ground, shape (T, 4).
+        foot_radius: of the toe sphere in m.
+        cutoff: of the smoothing, Hz.
+        fps: frames per second.
+
+    Returns:
+        Toe positions in m, shape (T, 4, 3).
+    """
+    weight = penalty(cutoff, fps)
+    D = difference_matrix(len(p_WF))
+    smoothness = weight * (D.T @ D) + eye_array(len(p_WF))
+    planted = np.empty_like(p_WF)
+    for leg in range(4):
+        target, contact = p_WF[:, leg], contacts[:, leg]
+        planted[:, leg, :2] = _fit_ground_plane(target[:, :2], contact, smoothness)
+        floor = foot_radius + swing_clearance(contact, fps)
+        planted[:, leg, 2] = _fit_height(target[:, 2], contact, floor, smoothness)
+    return planted
+
+
+def swing_clearance(contact: Bools, fps: float) -> Array:
+    """Returns how far over the ground a toe must swing, in m, shape (T,).
+
+    Zero in contact and at the ends of each swing, :data:`CLEARANCE` at mid-swing if the
+    swing is long enough; the clip's ends count as mid-swing.
+    """
+    clearance = np.zeros(len(contact))
+    for start, end in intervals(~contact):
+        frames = np.arange(start, end)
+        since = np.full(end - start, np.inf) if start == 0 else frames - start + 1.0
+        until = np.full(end - start, np.inf) if end == len(contact) else end - frames
+        seconds = np.minimum(since, until) / fps
+        parabola = LIFT_ACCELERATION * seconds**2 / 2
+        clearance[start:end] = np.minimum(parabola, CLEARANCE)
+    return clearance
+
+
+def _fit_ground_plane(target: Array, contact: Bools, smoothness: csc_matrix) -> Array:
+    """Returns x, y (T, 2) nearest to ``target`` that are constant in each contact."""
+    columns = np.cumsum(_starts_new_value(contact)) - 1
+    frames = len(target)
+    M = csr_matrix((np.ones(frames), (np.arange(frames), columns)))
+    values = spsolve(csc_matrix(M.T @ smoothness @ M), M.T @ target)
+    fitted: Array = M @ values.reshape(-1, 2)
+    return fitted
+
+
+def _starts_new_value(contact: Bools) -> Bools:
+    """Returns where a value differs from the frame before: not within a contact."""
+    new = np.ones(len(contact), dtype=bool)
+    new[1:] = ~(contact[1:] & contact[:-1])
+    return new
+
+
+def _fit_height(
+    target: Array, contact: Bools, floor: Array, smoothness: csc_matrix
+) -> Array:
+    """Returns z (T,) nearest to ``target``, at ``floor`` in contact, never below it.
+
+    An active-set method: frames that would sink are held at the floor, until none does.
+    """
+    held = contact.copy()
+    height = floor.copy()
+    for _ in range(_MAX_ROUNDS):
+        free = ~held
+        if not free.any():
+            break
+        coupling = smoothness.tocsr()[free]
+        right = target[free] - coupling[:, held] @ floor[held]
+        height = floor.copy()
+        height[free] = spsolve(csc_matrix(coupling[:, free]), right)
+        sunk = height < floor - 1e-9
+        if not sunk.any():
+            break
+        held |= sunk
+    return np.maximum(height, floor)
+
+
+def raise_trunk(targets: Targets, robot: Quadruped, fps: float) -> Targets:
+    """Returns ``targets`` with the trunk raised where the legs ask for it.
+
+    That is where a hip is so low that a leg under it could not fold enough, or a knee
+    is lower than :data:`KNEE_CLEARANCE`. Heading, pitch and toes are kept; the trunk
+    rises and sinks gently.
+    """
+    lowest_hip = robot.foot_radius + FOLD_MARGIN * robot.folded_length
+    ramp = round(RAMP_SECONDS * fps)
+    for _ in range(_MAX_LIFTS):
+        hips, knees = _hip_and_knee_heights(targets, robot)
+        missing = np.maximum(lowest_hip - hips, KNEE_CLEARANCE - knees)
+        if missing.max() < _CLOSE_ENOUGH:
+            break
+        lift = _gentle_envelope(np.maximum(missing, 0.0), ramp)
+        up = np.array([0.0, 0.0, 1.0])
+        targets = replace(targets, p_WB=targets.p_WB + lift[:, None] * up)
+    return targets
+
+
+def _hip_and_knee_heights(targets: Targets, robot: Quadruped) -> tuple[Array, Array]:
+    """Returns the heights in m of the lowest hip and the lowest knee, each (T,)."""
+    p_BKnee = robot.knee_positions(robot.nearest_joints(targets.p_BF))
+    q_WB, height = targets.q_WB[:, None], targets.p_WB[:, 2]
+    p_BHip = np.broadcast_to(robot.p_BHip, p_BKnee.shape)
+    hips, knees = (
+        height + quat_rotate(q_WB, points)[..., 2].min(axis=1)
+        for points in (p_BHip, p_BKnee)
+    )
+    return hips, knees
+
+
+def _gentle_envelope(values: Array, ramp: int) -> Array:
+    """Returns a smooth curve that is nowhere below ``values`` (T,).
+
+    The means are taken over no more frames than the maximum before them, so each of the
+    values that are averaged is at least that of the frame in the middle.
+    """
+    half = ramp // 2
+    envelope: Array = maximum_filter1d(values, 4 * half + 1, mode="nearest")
+    for _ in range(2):
+        envelope = uniform_filter1d(envelope, 2 * half + 1, mode="nearest")
+    return envelope

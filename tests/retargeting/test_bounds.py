@@ -1,0 +1,98 @@
+"""Results are looked at: what is outside its bounds is said; what is good is not."""
+
+import re
+from dataclasses import asdict, replace
+from math import inf
+
+import numpy as np
+import pytest
+
+from loco_drake.datasets.dog import read_dog
+from loco_drake.models.robot_files import load_robot
+from loco_drake.models.robots import get_robot
+from loco_drake.retargeting.bounds import BOUNDS, outside_bounds
+from loco_drake.retargeting.retarget import retarget_clip
+from tests.robot_files import SOLO8
+from tests.synthetic import write_dog_recording
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory):
+    path = tmp_path_factory.mktemp("dog") / "dog.txt"
+    write_dog_recording(path, "trot", seconds=2.0)
+    return read_dog(path, gait="trot")
+
+
+def test_good_motion_has_no_warning(clip, robot, solver):
+    motion, report = retarget_clip(clip, robot, solver=solver)
+    assert report.warnings == ()
+    assert "warnings" not in motion.provenance
+    assert (report.on_feet_share, report.on_feet_frames) == (1.0, "0-120")
+    assert report.toes_in_place_share == 1.0
+    assert report.unsolved_frames == 0
+
+
+@pytest.mark.parametrize("key", BOUNDS)
+def test_each_figure_outside_its_bound_is_said_with_the_bound(clip, key):
+    """At the bound nothing, a hair outside one sentence that names the figure."""
+    robot = get_robot("go2")
+    good = asdict(retarget_clip(clip, robot)[1])
+    bound = BOUNDS[key]
+    size = robot.stand_height if bound.stances else 1.0
+    for edge, beyond in ((bound.low, -1e-3), (bound.high, 1e-3)):
+        if (edge in (0, inf) and beyond < 0) or edge == inf:
+            continue
+        assert outside_bounds({**good, key: edge * size}, robot) == ()
+        (sentence,) = outside_bounds({**good, key: edge * size + beyond}, robot)
+        assert sentence.startswith(bound.name)
+        assert ", not " in sentence
+    (sentence,) = outside_bounds({**good, key: np.nan}, robot)
+    assert "nan" in sentence
+
+
+def test_legs_that_cannot_be_put_aside_may_slip(clip):
+    """.3 m/s to the side is what Solo8's planar legs do on a bend; the Go2's do not."""
+    figures = asdict(retarget_clip(clip, get_robot("go2"))[1])
+    figures["stance_slip_median_mps"] = 0.3
+    assert outside_bounds(figures, load_robot(str(SOLO8))) == ()
+    assert outside_bounds(figures, get_robot("go2")) == (
+        "slip 300 mm/s, not at most 30 mm/s",
+    )
+
+
+def exchanged(clip):
+    """Left toes on the right and right ones on the left."""
+    return replace(clip, toes=clip.toes[:, [1, 0, 3, 2]] + 0.0)
+
+
+def wide_and_exchanged(clip):
+    return exchanged(replace(clip, toes=clip.toes * [1.0, 10.0, 1.0]))
+
+
+def swimming(clip):
+    """Toes that go half a metre to and fro beside the trunk."""
+    toes = clip.toes.copy()
+    toes[..., 0] += 0.6 * np.sin(np.arange(len(clip)) / 10)[:, None]
+    return replace(clip, toes=toes)
+
+
+def sits_at_first(clip):
+    hip, toes = clip.hip.copy(), clip.toes.copy()
+    hip[:60, 2] = 0.08
+    return replace(clip, hip=hip, toes=toes)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (exchanged, "left toes from its right ones -60 mm, not at least 0 mm"),
+        (wide_and_exchanged, r"toes in their place 0 %, not at least 75 %"),
+        (swimming, "correction"),
+        (sits_at_first, r"frames on its feet 50 % \(60-120\), not at least 95 %"),
+    ],
+)
+def test_wrong_motion_is_warned_of_in_report_and_file(clip, spoil, reason):
+    motion, report = retarget_clip(spoil(clip), get_robot("go2"))
+    text = "; ".join(report.warnings)
+    assert re.search(reason, text), text
+    assert motion.provenance["warnings"] == text
