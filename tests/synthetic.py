@@ -112,6 +112,16 @@ def write_dog_recording(
     return dog
 
 
+def write_lying_dog(path: Path, gait: str = "trot") -> None:
+    """Writes a dog that lies for 200 frames, rises for 40 and then runs for 4 s."""
+    write_dog_recording(path, gait)
+    runs = np.loadtxt(path, delimiter=",").reshape(-1, 27, 3)
+    drop = np.concatenate((np.ones(200), np.linspace(1, 0, 40)))[:, None]
+    lies = np.repeat(runs[:1], 240, axis=0)
+    lies[..., 1] -= 0.34 * drop * (lies[..., 1] > 0.35)
+    save_points(path, np.concatenate((lies, runs)))
+
+
 def dog_points(dog: SyntheticDog) -> Array:
     """Returns the 27 points of the skeleton, Z up, shape (T, 27, 3)."""
     points = np.empty((len(dog.hip), 27, 3))

@@ -1,12 +1,12 @@
 import json
 
-import numpy as np
 import pytest
 import tyro
 
 from loco_drake.cli.evaluate_retargeting import EvaluateRetargeting
 from loco_drake.common.errors import InputError
 from tests.robot_files import SOLO8
+from tests.synthetic import write_dog_recording, write_lying_dog
 
 KEYS = {
     "stance_slip_median_mps",
@@ -95,14 +95,11 @@ def test_wrong_input_raises_one_sentence(made_data, tmp_path):
 def test_clips_outside_their_bounds_are_marked_and_strict_fails(
     made_data, tmp_path, capsys
 ):
-    """A pace whose left and right toes are exchanged, beside one that is right."""
-    (tmp_path / "dog_mann" / "keypoints").mkdir(parents=True)
-    rows = np.loadtxt(made_data / "dog_mann/keypoints/made_pace.txt", delimiter=",")
+    """A dog that lies for a while, beside one that only paces."""
     folder = tmp_path / "dog_mann" / "keypoints"
-    np.savetxt(folder / "good.txt", rows, delimiter=",", fmt="%.5f")
-    points = rows.reshape(len(rows), 27, 3)
-    points[:, [10, 15, 19, 23]] = points[:, [15, 10, 23, 19]]
-    np.savetxt(folder / "bad.txt", rows, delimiter=",", fmt="%.5f")
+    folder.mkdir(parents=True)
+    write_dog_recording(folder / "good.txt", "pace")
+    write_lying_dog(folder / "bad.txt", "pace")
     head = (made_data / "segments.csv").read_text().splitlines()[0]
     stretches = [
         f"dog_mann,keypoints/{name}.txt,pace,0,240,60,1," for name in ("good", "bad")
@@ -114,7 +111,7 @@ def test_clips_outside_their_bounds_are_marked_and_strict_fails(
         printed = capsys.readouterr()
         assert "dog-pace (!)" in printed.out
         bad = "dog-pace-bad-0-240"
-        assert printed.err.count(f"Warning: {bad}: distance of the recording's") == 1
+        assert printed.err.count(f"Warning: {bad}: frames on its feet") == 1
         assert "good" not in printed.err
         result = json.loads((tmp_path / "a.json").read_text())["robots"]["go2"]
         assert list(result["warnings"]) == [bad]

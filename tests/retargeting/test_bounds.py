@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from loco_drake.datasets.dog import read_dog
+from loco_drake.datasets.registry import read_clip
 from loco_drake.models.robot_files import load_robot
 from loco_drake.models.robots import get_robot
 from loco_drake.retargeting.bounds import BOUNDS, outside_bounds
@@ -20,7 +20,7 @@ from tests.synthetic import write_dog_recording
 def clip(tmp_path_factory):
     path = tmp_path_factory.mktemp("dog") / "dog.txt"
     write_dog_recording(path, "trot", seconds=2.0)
-    return read_dog(path, gait="trot")
+    return read_clip("dog", path, gait="trot")
 
 
 def test_good_motion_has_no_warning(clip, robot, solver):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from pydrake.solvers import SnoptSolver
 
-from loco_drake.datasets.dog import read_dog
+from loco_drake.datasets.registry import read_clip
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import retarget_clip
 from tests.synthetic import write_dog_recording
@@ -62,7 +62,7 @@ def test_frames_without_a_solution_are_said_and_get_the_nearest_joints(robot):
 
 def test_motion_of_frames_without_a_solution_is_warned_of(robot, tmp_path):
     write_dog_recording(tmp_path / "dog.txt", "pace", seconds=1.0)
-    clip = read_dog(tmp_path / "dog.txt", gait="pace")
+    clip = read_clip("dog", tmp_path / "dog.txt", gait="pace")
     solver = LegSolver(robot, FPS)
     solver.options.SetOption(SnoptSolver.id(), "Major iterations limit", 0)
     _, report = retarget_clip(clip, robot, solver=solver)
