@@ -8,6 +8,7 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from loco_drake.common.rotations import quat_rotate
 from loco_drake.control.plan import standing_plan
+from loco_drake.control.state import ORIENTATION, POSITION
 from loco_drake.models.robots import Robot
 
 # Those of the paper's Figure 1.
@@ -60,7 +61,7 @@ class KeypointVisualizer(LeafSystem):
         plan = self._plan.Eval(context)
         k = plan.index(time)
         q = plan.q[k]
-        trunk = q[4:7] + quat_rotate(q[None, :4], self._p_BK)
+        trunk = q[POSITION] + quat_rotate(q[ORIENTATION], self._p_BK)
         for path, p_W in zip(
             self._paths, np.concatenate((plan.p_WF[k], trunk)), strict=True
         ):

@@ -7,6 +7,12 @@ from numpy.typing import NDArray
 
 from loco_drake.common.rotations import quat_conjugate, quat_rotate
 from loco_drake.control.plan import Plan
+from loco_drake.control.state import (
+    JOINT_VELOCITIES,
+    JOINTS,
+    ORIENTATION,
+    VELOCITY,
+)
 from loco_drake.models.robots import Robot
 
 Array = NDArray[np.float64]
@@ -39,7 +45,7 @@ def set_points(robot: Robot, plan: Plan) -> Array:
     :func:`feed_forward_torques`: all act through the position.
     """
     torques = feed_forward_torques(robot, plan)
-    points = plan.q[:, 7:] + (robot.kd * plan.v[:, 6:] + torques) / robot.kp
+    points = plan.q[JOINTS] + (robot.kd * plan.v[JOINT_VELOCITIES] + torques) / robot.kp
     points.setflags(write=False)
     return points
 
@@ -55,11 +61,11 @@ def feed_forward_torques(robot: Robot, plan: Plan) -> Array:
     the policy from having to learn first that robots have mass.
     """
     contacts = plan.contacts
-    load = np.clip(1 + plan.vdot[:, 5] / GRAVITY, 0.0, _MAX_LOAD)
+    load = np.clip(1 + plan.vdot[VELOCITY][:, 2] / GRAVITY, 0.0, _MAX_LOAD)
     share = contacts / np.maximum(contacts.sum(axis=1, keepdims=True), 1)
     force = robot.mass * GRAVITY * load[:, None] * share  # (N, 4)
-    up_B = quat_rotate(quat_conjugate(plan.q[:, :4]), np.array([0.0, 0.0, 1.0]))
+    up_B = quat_rotate(quat_conjugate(plan.q[ORIENTATION]), np.array([0.0, 0.0, 1.0]))
     # (N, 4, 3 rows x y z, 3 joints) against (N, 3)
-    lift = np.einsum("nlij,ni->nlj", robot.toe_jacobians(plan.q[:, 7:]), up_B)
+    lift = np.einsum("nlij,ni->nlj", robot.toe_jacobians(plan.q[JOINTS]), up_B)
     support = (-force[..., None] * lift).reshape(len(plan), -1)
-    return support + robot.joint_inertia * plan.vdot[:, 6:]
+    return support + robot.joint_inertia * plan.vdot[JOINT_VELOCITIES]

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.rotations import quat_to_matrix
+from loco_drake.control.state import HEIGHT, ORIENTATION
 from loco_drake.models.robots import Robot
 
 # Tilted this far from upright, a robot does not come back to its feet.
@@ -28,7 +29,7 @@ def has_fallen(
     """
     # The world's z axis in the trunk's frame.
     if R_WB is None:
-        R_WB = quat_to_matrix(q[..., :4])
+        R_WB = quat_to_matrix(q[ORIENTATION])
     z_B = R_WB[..., 2, :]
-    lowest = q[..., 6] + (z_B @ (_CORNERS * robot.trunk_size).T).min(axis=-1)
+    lowest = q[..., HEIGHT] + (z_B @ (_CORNERS * robot.trunk_size).T).min(axis=-1)
     return (lowest <= 0) | (z_B[..., 2] < np.cos(_MAX_TILT))

@@ -13,6 +13,16 @@ from loco_drake.common.rotations import (
     quat_to_matrix,
 )
 from loco_drake.control.plan import Plan
+from loco_drake.control.state import (
+    ANGULAR_VELOCITY,
+    HEIGHT,
+    JOINT_VELOCITIES,
+    JOINTS,
+    ORIENTATION,
+    POSITION,
+    VELOCITY,
+    split,
+)
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import ONE_HOT, ONE_HOT_SIZE
 
@@ -81,28 +91,31 @@ def observe(
     Args:
         robot: the robot.
         ahead: what it is to do.
-        state: the plant's [q, v], as in :class:`Plan`, shape (..., 37).
+        state: the robot's [q, v], its quaternion of length one, shape (..., 37).
         action: the action being applied, shape (..., 12).
         R_WB: the base's rotation matrix (..., 3, 3), if it is known already.
     """
-    q, v = state[..., :19], state[..., 19:]
+    q, v = split(state)
+    robots = q[..., None, :]  # against the samples ahead
     if R_WB is None:
-        R_WB = quat_to_matrix(q[..., :4])
+        R_WB = quat_to_matrix(q[ORIENTATION])
     R_WH = heading_matrix(R_WB)
     parts = (
         -R_WB[..., 2, :],
-        _times(v[..., :3], R_WB),
-        _times(v[..., 3:6], R_WH),
-        q[..., 6:7],
-        q[..., 7:] - robot.stand_joints,
-        0.1 * v[..., 6:],
+        _times(v[ANGULAR_VELOCITY], R_WB),
+        _times(v[VELOCITY], R_WH),
+        q[..., HEIGHT, None],
+        q[JOINTS] - robot.stand_joints,
+        0.1 * v[JOINT_VELOCITIES],
         action,
-        0.1 * ahead.v[..., 0, 6:],
-        ahead.q[..., 7:] - q[..., None, 7:],
-        (ahead.q[..., 4:7] - q[..., None, 4:7]) @ R_WH,
-        quat_log(quat_multiply(quat_conjugate(q[..., None, :4]), ahead.q[..., :4])),
-        ahead.v[..., 3:6] @ R_WH,
-        ahead.v[..., :3] @ R_WH,
+        0.1 * ahead.v[..., 0, :][JOINT_VELOCITIES],
+        ahead.q[JOINTS] - robots[JOINTS],
+        (ahead.q[POSITION] - robots[POSITION]) @ R_WH,
+        quat_log(
+            quat_multiply(quat_conjugate(robots[ORIENTATION]), ahead.q[ORIENTATION])
+        ),
+        ahead.v[VELOCITY] @ R_WH,
+        ahead.v[ANGULAR_VELOCITY] @ R_WH,
         ahead.contacts,
         ONE_HOT[ahead.label],
     )

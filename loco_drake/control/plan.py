@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import quat_conjugate, quat_rotate, yaw_of, yaw_quat
+from loco_drake.control.state import JOINTS, ORIENTATION, POSITION, unit_base
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.motion.motion import FPS, Motion
@@ -89,16 +90,16 @@ class Plan:
                 )
             # A copy: whoever made the array may hold it, or a view of it.
             own: NDArray[Any] = given.astype(wanted)
-            own.setflags(write=False)
-            object.__setattr__(self, name, own)
+            object.__setattr__(self, name, _read_only(own))
         self._check_values()
+        object.__setattr__(self, "q", _read_only(unit_base(self.q)))
 
     def _check_values(self) -> None:
         """Raises InputError if a number in it cannot be."""
         finite = all(np.isfinite(getattr(self, name)).all() for name in _ARRAYS)
         if not (finite and np.isfinite(self.start_time)):
             raise InputError("A plan's numbers and start time must be finite.")
-        norms = np.linalg.norm(self.q[:, :4], axis=1)
+        norms = np.linalg.norm(self.q[ORIENTATION], axis=1)
         if np.abs(norms - 1).max() > _MAX_NORM_ERROR:
             raise InputError(
                 "A plan's q must begin with unit quaternions w, x, y, z; one has the "
@@ -132,8 +133,8 @@ class Plan:
     @cached_property
     def p_BoF_H(self) -> Array:
         """Toes relative to the base in its heading frame (z up), m, shape (N, 4, 3)."""
-        q_HW = quat_conjugate(yaw_quat(yaw_of(self.q[:, :4])))
-        p_BoF_W = self.p_WF - self.q[:, None, 4:7]
+        q_HW = quat_conjugate(yaw_quat(yaw_of(self.q[ORIENTATION])))
+        p_BoF_W = self.p_WF - self.q[POSITION][:, None]
         return _read_only(quat_rotate(q_HW[:, None], p_BoF_W))
 
     @property
@@ -152,7 +153,7 @@ class Plan:
         return min(max(k, 0), len(self) - 1)
 
 
-def _read_only(array: Array) -> Array:
+def _read_only(array: NDArray[Any]) -> NDArray[Any]:
     array.setflags(write=False)
     return array
 
@@ -169,8 +170,8 @@ def make_plan(
     open_ended: bool = False,
 ) -> Plan:
     """Returns a Plan; toes follow from the robot's model, accelerations from ``v``."""
-    p_BF = robot.toe_positions(q[:, 7:])
-    p_WF = q[:, None, 4:7] + quat_rotate(q[:, None, :4], p_BF)
+    p_BF = robot.toe_positions(q[JOINTS])
+    p_WF = q[POSITION][:, None] + quat_rotate(q[ORIENTATION][:, None], p_BF)
     if path_time is None:
         path_time = PLAN_DT * np.arange(len(q), dtype=np.float64)
     vdot = np.gradient(v, axis=0) * FPS if len(v) > 1 else np.zeros_like(v)

@@ -4,6 +4,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.rotations import heading_matrix, quat_error, quat_to_matrix
+from loco_drake.control.state import (
+    ANGULAR_VELOCITY,
+    JOINT_VELOCITIES,
+    JOINTS,
+    ORIENTATION,
+    POSITION,
+    VELOCITY,
+    split,
+)
 from loco_drake.models.robots import Robot
 
 Array = NDArray[np.float64]
@@ -36,25 +45,25 @@ def reward_terms(
         robot: the robot.
         plan_state: what the plan wants, [q, v] as in :class:`Plan`, shape (..., 37).
         plan_p_BoF_H: the plan's toes, as :attr:`Plan.p_BoF_H`, shape (..., 4, 3).
-        state: the plant's [q, v], shape (..., 37).
+        state: the robot's [q, v], its quaternion of length one, shape (..., 37).
         R_WB: the base's rotation matrix (..., 3, 3), if it is known already.
     """
-    q, v = state[..., :19], state[..., 19:]
+    (q, v), (plan_q, plan_v) = split(state), split(plan_state)
     if R_WB is None:
-        R_WB = quat_to_matrix(q[..., :4])
-    p_BoF_H = robot.toe_positions(q[..., 7:]) @ (
+        R_WB = quat_to_matrix(q[ORIENTATION])
+    p_BoF_H = robot.toe_positions(q[JOINTS]) @ (
         np.swapaxes(R_WB, -1, -2) @ heading_matrix(R_WB)
     )
-    gap = q[..., 4:] - plan_state[..., 4:19]
-    turn = quat_error(q[..., :4], plan_state[..., :4])
-    velocity = v - plan_state[..., 19:]
+    gap = q - plan_q
+    turn = quat_error(q[ORIENTATION], plan_q[ORIENTATION])
+    velocity = v - plan_v
     toes = p_BoF_H - plan_p_BoF_H
     exponents = (
-        5 * _squares(gap[..., 3:]),
-        0.1 * _squares(velocity[..., 6:]),
+        5 * _squares(gap[JOINTS]),
+        0.1 * _squares(velocity[JOINT_VELOCITIES]),
         40 * _squares(toes.reshape(*toes.shape[:-2], 12)),
-        20 * _squares(gap[..., :3]) + 10 * _squares(turn),
-        2 * _squares(velocity[..., 3:6]) + 0.2 * _squares(velocity[..., :3]),
+        20 * _squares(gap[POSITION]) + 10 * _squares(turn),
+        2 * _squares(velocity[VELOCITY]) + 0.2 * _squares(velocity[ANGULAR_VELOCITY]),
     )
     return REWARD_WEIGHTS * np.exp(-np.stack(exponents, axis=-1))
 

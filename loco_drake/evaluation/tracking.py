@@ -18,6 +18,15 @@ from loco_drake.common.rotations import (
 )
 from loco_drake.control.action import GRAVITY
 from loco_drake.control.plan import PLAN_DT
+from loco_drake.control.state import (
+    HEIGHT,
+    JOINT_VELOCITIES,
+    JOINTS,
+    ORIENTATION,
+    POSITION,
+    VELOCITY,
+    split,
+)
 from loco_drake.models.robots import Robot
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.quality import stance_slip_speeds
@@ -75,7 +84,8 @@ def normalized_return(rollout: Rollout) -> float:
 
 def joint_rmse(rollout: Rollout) -> float:
     """Root mean square over samples and joints of the angle from the plan, rad."""
-    error = (rollout.state - rollout.plan_state)[:, 7:19]
+    q, _ = split(rollout.state - rollout.plan_state)
+    error = q[JOINTS]
     return float(np.sqrt(np.mean(error**2)))
 
 
@@ -92,12 +102,13 @@ def base_errors(rollout: Rollout) -> tuple[float, float]:
     for first in range(0, len(rollout.state), samples):
         own = rollout.state[first : first + samples]
         plan = rollout.plan_state[first : first + samples]
-        turn = yaw_quat(yaw_of(own[0, :4]) - yaw_of(plan[0, :4]))
-        p_plan = quat_rotate(turn, plan[:, 4:7] - plan[0, 4:7])
-        p_plan[:, 2] = plan[:, 6]
-        p_own = own[:, 4:7] - own[0, 4:7]
-        p_own[:, 2] = own[:, 6]
-        rotation = quat_error(own[:, :4], quat_multiply(turn[None], plan[:, :4]))
+        q_own, q_plan = own[ORIENTATION], plan[ORIENTATION]
+        turn = yaw_quat(yaw_of(q_own[0]) - yaw_of(q_plan[0]))
+        p_plan = quat_rotate(turn, (plan - plan[0])[POSITION])
+        p_plan[:, 2] = plan[:, HEIGHT]
+        p_own = (own - own[0])[POSITION]
+        p_own[:, 2] = own[:, HEIGHT]
+        rotation = quat_error(q_own, quat_multiply(turn[None], q_plan))
         squares.append(
             np.stack(
                 (((p_own - p_plan) ** 2).sum(axis=1), (rotation**2).sum(axis=1)), axis=1
@@ -116,8 +127,8 @@ def stretch(rollout: Rollout) -> float:
 
 def speed(rollout: Rollout) -> float:
     """Mean over samples of the base's velocity along its own heading, m/s."""
-    yaw = yaw_of(rollout.state[:, :4])
-    v = rollout.state[:, 22:25]
+    q, v = split(rollout.state)
+    yaw, v = yaw_of(q[ORIENTATION]), v[VELOCITY]
     return float(np.mean(v[:, 0] * np.cos(yaw) + v[:, 1] * np.sin(yaw)))
 
 
@@ -126,8 +137,9 @@ def slip_speeds(rollout: Rollout, robot: Robot) -> Array:
 
     See :func:`loco_drake.motion.quality.stance_slip_speeds`.
     """
-    q = rollout.state[:, :19]
-    p_WF = q[:, None, 4:7] + quat_rotate(q[:, None, :4], robot.toe_positions(q[:, 7:]))
+    q, _ = split(rollout.state)
+    p_BF_W = quat_rotate(q[ORIENTATION][:, None], robot.toe_positions(q[JOINTS]))
+    p_WF = q[POSITION][:, None] + p_BF_W
     return stance_slip_speeds(p_WF, robot.foot_radius, FPS)
 
 
@@ -142,11 +154,12 @@ def effort_metrics(rollout: Rollout, robot: Robot) -> dict[str, float]:
     - cost_of_transport: mean of sum |tau v| over mass, gravity and mean horizontal
       speed; what braking returns is not counted as a gain
     """
-    q, v = rollout.state[:, 7:19], rollout.state[:, 25:]
-    asked = robot.kp * (rollout.desired_joints - q) - robot.kd * v
+    q, base_and_joints = split(rollout.state)
+    v = base_and_joints[JOINT_VELOCITIES]
+    asked = robot.kp * (rollout.desired_joints - q[JOINTS]) - robot.kd * v
     torque = np.clip(asked, -robot.effort_limits, robot.effort_limits)
     power = float(np.abs(torque * v).sum(axis=1).mean())
-    speed = float(np.linalg.norm(rollout.state[:, 22:24], axis=1).mean())
+    speed = float(np.linalg.norm(base_and_joints[VELOCITY][:, :2], axis=1).mean())
     return {
         "torque_saturation": float(np.mean(np.abs(asked) >= robot.effort_limits)),
         "speed_saturation": float(np.mean(np.abs(v) >= robot.joint_speed_limits)),

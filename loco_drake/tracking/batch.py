@@ -11,7 +11,7 @@ from loco_drake.control.measurement import draw_error, measure
 from loco_drake.control.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.reward import reward_terms
-from loco_drake.control.state import unit_base
+from loco_drake.control.state import ORIENTATION, POSITION, split, unit_base
 from loco_drake.models.robots import get_robot
 from loco_drake.tracking.environment_config import EnvironmentConfig
 from loco_drake.tracking.physics import make_worlds
@@ -93,7 +93,7 @@ class TrackingBatch:
         self._last[i] = min(sample + steps, length - 1)
         wanted = self._plans[plan].state[sample]
         self._state[i] = self._config.reset_noise.draw(wanted, random)
-        self._R_WB[i] = quat_to_matrix(self._state[i, :4])
+        self._R_WB[i] = quat_to_matrix(self._state[i][ORIENTATION])
         self._action[i] = 0.0
         domain = self._config.randomization.draw(
             self._robot, random, sample * PLAN_DT, self._last[i] * PLAN_DT
@@ -120,10 +120,10 @@ class TrackingBatch:
             self._state[i] = self._worlds[i].advance(state, desired_state[i])
         self._state = unit_base(self._state)
         wanted, toes = self._wanted[now], self._toes[now]
-        self._R_WB = quat_to_matrix(self._state[:, :4])
+        self._R_WB = quat_to_matrix(self._state[ORIENTATION])
         terms = reward_terms(self._robot, wanted, toes, self._state, self._R_WB)
-        gap = self._state[:, 4:6] - wanted[:, 4:6]
-        fallen = has_fallen(self._robot, self._state[:, :19], self._R_WB)
+        gap = (self._state - wanted)[POSITION][:, :2]
+        fallen = has_fallen(self._robot, split(self._state)[0], self._R_WB)
         self.penalty = self._config.homing * np.linalg.norm(gap, axis=1)
         self.penalty += self._config.fall_cost * fallen
         lost = fallen | has_strayed(self._config.termination, self._state, wanted)
@@ -141,10 +141,10 @@ class TrackingBatch:
         first, last = self._first[plan], self._lengths[plan] - 1
         ahead = np.minimum(sample[:, None] + LOOK_AHEAD, last[:, None])
         rows = first[:, None] + ahead
-        wanted = self._wanted[rows]
+        q, v = split(self._wanted[rows])
         shown = Preview(
-            q=wanted[..., :19],
-            v=wanted[..., 19:],
+            q=q,
+            v=v,
             contacts=self._contacts[rows],
             label=self._labels[first + sample],
         )
