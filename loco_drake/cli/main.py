@@ -3,6 +3,7 @@
 import logging
 import sys
 from importlib import import_module
+from typing import Any
 
 import tyro
 from rich.console import Console
@@ -86,7 +87,13 @@ def main(arguments: list[str] | None = None) -> int:
         command = getattr(import_module(f"loco_drake.cli.{module}"), class_name)
         # A filter, for importing Drake sets the level anew.
         logging.getLogger("drake").addFilter(_is_error)
-        status: int = tyro.cli(command, prog=f"loco-drake {name}", args=rest).run()
+        prog = f"loco-drake {name}"
+        parsed: Any = tyro.cli(command, prog=prog, args=rest)
+        if getattr(parsed, "resume", False):
+            from loco_drake.cli.training import parse_resumed
+
+            parsed = parse_resumed(parsed, prog, rest)
+        status: int = parsed.run()
         return status
     except InputError as error:
         print(f"loco-drake: {error}", file=sys.stderr)

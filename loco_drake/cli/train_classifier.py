@@ -3,36 +3,34 @@
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from loco_drake.cli.evaluation import estimate_text
 from loco_drake.cli.output import print_table, write_json
-from loco_drake.cli.training import check_steps, print_stopped
+from loco_drake.cli.training import print_stopped
 from loco_drake.common.errors import InputError
+from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.motion.gaits import LABELS
 
 
 @dataclass(kw_only=True)
-class TrainClassifier:
+class TrainClassifier(LoopSettings):
     """Trains the transformer that tells which gait a trajectory of 2 s is of.
 
     `evaluate generation` trains its own; this one is to be looked at and used. Ctrl-C
     saves a checkpoint and stops; --resume goes on from it.
     """
 
+    NAME: ClassVar[str] = "classifier"
     motions: Path = Path("motions/go2")
     """Folder of Motion files, such as `retarget` writes; those for validation are held
     out to test on."""
     out: Path = Path("runs/classifier")
     """Folder for the weights (classifier.safetensors), checkpoint and logs."""
     steps: int = 300
-    """Optimizer steps."""
+    """Optimizer steps in all."""
     learning_rate: float = 1e-3
     """Highest learning rate."""
-    seed: int = 0
-    """Of the weights and the batches."""
-    resume: bool = False
-    """Go on from the checkpoint in --out."""
     json: Path | None = None
     """Writes the figures to this file."""
 
@@ -42,7 +40,8 @@ class TrainClassifier:
         Raises:
             InputError: if an option is wrong.
         """
-        check_steps(self.steps, self.learning_rate)
+        self.check()
+        from loco_drake.common.run_folder import check_folder
         from loco_drake.evaluation.classifier import ClassifierConfig, predict
         from loco_drake.evaluation.confidence import accuracy
         from loco_drake.evaluation.recorded import load_recorded
@@ -51,9 +50,9 @@ class TrainClassifier:
             class_indices,
             train_classifier,
         )
-        from loco_drake.generation.training import LoopSettings
         from loco_drake.retargeting.trajectories import trajectories
 
+        check_folder(self.out, f"{self.NAME}.safetensors", self.resume)
         robot, recorded = load_recorded(self.motions)
         train, validation = (
             [part for motion in side for part in trajectories(motion)]
@@ -68,16 +67,9 @@ class TrainClassifier:
             )
         validation = [motion for motion in validation if motion.label in present]
         samples = make_samples(robot, train)
-        settings = LoopSettings(
-            out=self.out,
-            steps=self.steps,
-            learning_rate=self.learning_rate,
-            seed=self.seed,
-            resume=self.resume,
-        )
         start = time.perf_counter()
         classifier, result = train_classifier(
-            samples, ClassifierConfig(labels=labels), settings
+            samples, ClassifierConfig(labels=labels), self
         )
         if result.stopped:
             return print_stopped(result.steps, self.steps)

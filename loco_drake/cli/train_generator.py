@@ -3,19 +3,22 @@
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from loco_drake.cli.output import print_table, write_json
-from loco_drake.cli.training import check_steps, print_stopped
+from loco_drake.cli.training import print_stopped
 from loco_drake.common.errors import InputError, check_at_least
+from loco_drake.generation.loop_settings import LoopSettings
 
 
 @dataclass(kw_only=True)
-class TrainGenerator:
+class TrainGenerator(LoopSettings):
     """Trains the GPT that writes tokens for a gait and a duration.
 
     Ctrl-C saves a checkpoint and stops; --resume goes on from it.
     """
 
+    NAME: ClassVar[str] = "generator"
     motions: tuple[Path, ...] = (Path("motions/go2"),)
     """Folders of Motion files, those that the tokenizer was trained on."""
     tokenizer: Path = Path("runs/tokenizer/tokenizer.safetensors")
@@ -26,15 +29,13 @@ class TrainGenerator:
     """Codebooks of the tokenizer that it writes, the coarsest first. Finer ones hold
     what is too irregular to be predicted."""
     steps: int = 6000
-    """Optimizer steps."""
+    """Optimizer steps in all."""
     stitched: int = 50
     """Motions of 20 s that are made of the clips to learn from, for each gait."""
     learning_rate: float = 1e-3
     """Highest learning rate."""
-    seed: int = 0
-    """Of the weights and the batches."""
-    resume: bool = False
-    """Go on from the checkpoint in --out."""
+    weight_decay: float = 0.1
+    """Of AdamW."""
     json: Path | None = None
     """Writes the figures to this file."""
 
@@ -44,17 +45,18 @@ class TrainGenerator:
         Raises:
             InputError: if an option is wrong.
         """
-        check_steps(self.steps, self.learning_rate)
         check_at_least("stitched", self.stitched, 1)
+        self.check()
+        from loco_drake.common.run_folder import check_folder
         from loco_drake.generation.generator import GeneratorConfig
         from loco_drake.generation.tokenizer import load_tokenizer
         from loco_drake.generation.train_generator import (
             score_generator,
             train_generator,
         )
-        from loco_drake.generation.training import LoopSettings
         from loco_drake.generation.training_motions import load_library
 
+        check_folder(self.out, f"{self.NAME}.safetensors", self.resume)
         library = load_library(*self.motions)
         tokenizer = load_tokenizer(self.tokenizer)
         if not 1 <= self.books <= tokenizer.config.books:
@@ -69,26 +71,17 @@ class TrainGenerator:
             frames_per_token=tokenizer.config.frames_per_token,
             labels=tuple(str(label) for label in library.labels),
         )
-        settings = LoopSettings(
-            out=self.out,
-            steps=self.steps,
-            learning_rate=self.learning_rate,
-            weight_decay=0.1,
-            seed=self.seed,
-            resume=self.resume,
-        )
         start = time.perf_counter()
         generator, result = train_generator(
-            library, tokenizer, config, settings, self.stitched
+            library, tokenizer, config, self, self.stitched
         )
         if result.stopped:
             return print_stopped(result.steps, self.steps)
         figures = {"steps": result.steps, "wall_clock_s": time.perf_counter() - start}
         for name, clips in (("train", library.train), ("held_out", library.held_out)):
             if clips:
-                figures[f"{name}_nats_per_code"] = score_generator(
-                    generator, tokenizer, clips
-                )
+                score = score_generator(generator, tokenizer, clips)
+                figures[f"{name}_nats_per_code"] = score
         write_json(self.json, figures)
         rows = [
             [key.replace("_", " "), f"{value:.4g}"] for key, value in figures.items()

@@ -3,31 +3,30 @@
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any, ClassVar
 
 from loco_drake.cli.output import print_table, write_json
-from loco_drake.cli.training import check_steps, print_stopped
+from loco_drake.cli.training import print_stopped
+from loco_drake.generation.loop_settings import LoopSettings
 
 
 @dataclass(kw_only=True)
-class TrainTokenizer:
+class TrainTokenizer(LoopSettings):
     """Trains the VQ-VAE that turns motion into tokens and back.
 
     Ctrl-C saves a checkpoint and stops; --resume goes on from it.
     """
 
+    NAME: ClassVar[str] = "tokenizer"
     motions: tuple[Path, ...] = (Path("motions/go2"),)
     """Folders of Motion files, such as `retarget` writes, one for each robot; those for
     validation are held out to test on."""
     out: Path = Path("runs/tokenizer")
     """Folder for the weights (tokenizer.safetensors), checkpoint and logs."""
     steps: int = 9000
-    """Optimizer steps."""
+    """Optimizer steps in all."""
     learning_rate: float = 2e-3
     """Highest learning rate."""
-    seed: int = 0
-    """Of the weights and the batches."""
-    resume: bool = False
-    """Go on from the checkpoint in --out."""
     json: Path | None = None
     """Writes the figures to this file."""
 
@@ -37,28 +36,21 @@ class TrainTokenizer:
         Raises:
             InputError: if an option is wrong.
         """
-        check_steps(self.steps, self.learning_rate)
+        self.check()
+        from loco_drake.common.run_folder import check_folder
         from loco_drake.generation.tokenizer import TokenizerConfig
         from loco_drake.generation.tokenizer_score import codebook_use, score_tokenizer
         from loco_drake.generation.train_tokenizer import train_tokenizer
-        from loco_drake.generation.training import LoopSettings
         from loco_drake.generation.training_motions import load_library
 
+        check_folder(self.out, f"{self.NAME}.safetensors", self.resume)
         library = load_library(*self.motions)
-        settings = LoopSettings(
-            out=self.out,
-            steps=self.steps,
-            learning_rate=self.learning_rate,
-            seed=self.seed,
-            resume=self.resume,
-        )
         start = time.perf_counter()
-        tokenizer, result = train_tokenizer(
-            library, TokenizerConfig(robots=library.robots), settings
-        )
+        config = TokenizerConfig(robots=library.robots)
+        tokenizer, result = train_tokenizer(library, config, self)
         if result.stopped:
             return print_stopped(result.steps, self.steps)
-        figures: dict[str, object] = {
+        figures: dict[str, Any] = {
             "steps": result.steps,
             "wall_clock_s": time.perf_counter() - start,
             "codebook_use": codebook_use(tokenizer, library.train + library.held_out),
@@ -69,9 +61,8 @@ class TrainTokenizer:
                 score = score_tokenizer(tokenizer, clips)
                 figures[name] = asdict(score)
                 toes = f"{score.toe_error_rmse_m * 1000:.1f}"
-                rows.append(
-                    [name.replace("_", " "), f"{score.joint_rmse_rad:.4f}", toes]
-                )
+                joints = f"{score.joint_rmse_rad:.4f}"
+                rows.append([name.replace("_", " "), joints, toes])
         write_json(self.json, figures)
         print_table(
             f"{self.out / 'tokenizer.safetensors'}: {figures['codebook_use']:.0%} of "

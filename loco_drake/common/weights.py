@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 import torch
-from safetensors import safe_open
+from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
@@ -54,7 +54,10 @@ def save_weights(
     )
     header["content_sha256"] = _content_sha256(header, stored)
     with atomic_path(Path(path)) as temporary:
-        save_file(stored, temporary, metadata={"loco_drake": json.dumps(header)})
+        try:
+            save_file(stored, temporary, metadata={"loco_drake": json.dumps(header)})
+        except SafetensorError as error:  # a full disk
+            raise OSError(f"{path} could not be written: {error}") from None
 
 
 def load_weights(

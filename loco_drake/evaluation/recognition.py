@@ -41,7 +41,7 @@ from loco_drake.evaluation.train_classifier import (
     fit_linear,
     train_classifier,
 )
-from loco_drake.generation.training import LoopSettings
+from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.motion.gaits import LABELS, SOURCES
 
 Array = NDArray[np.float64]

@@ -18,7 +18,8 @@ from loco_drake.evaluation.classifier import (
     save_classifier,
 )
 from loco_drake.evaluation.samples import CHANNELS, Samples, label_weights
-from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.generation.loop_settings import LoopSettings
+from loco_drake.generation.training import LoopResult, train
 from loco_drake.motion.gaits import LABELS
 
 BATCH = 48
@@ -57,7 +58,7 @@ def train_classifier(
         right = (logits.argmax(dim=-1) == targets[rows]).float().mean()
         return loss, {"accuracy": right.item()}
 
-    run = {"network": asdict(config), "trajectories": len(samples)}
+    run = {"network": asdict(config), "motions": f"{len(samples)} trajectories"}
     result = train("classifier", classifier, loss_of_batch, settings, run)
     classifier.requires_grad_(False)
     if not result.stopped:

@@ -20,10 +20,11 @@ from loco_drake.generation.generator import (
     duration_bin,
     save_generator,
 )
+from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.stitching import Stitcher
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.tokenizer_score import clip_tensor
-from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.generation.training import LoopResult, train
 from loco_drake.generation.training_motions import Clip, Library
 from loco_drake.generation.training_record import training_record
 from loco_drake.motion.gaits import GaitLabel
@@ -139,7 +140,8 @@ def train_generator(
 
     run = {
         "network": asdict(config),
-        "corruption": CORRUPTION,
+        "motions": library.summary,
+        "books": config.books,
         "stitched": stitched,
     }
     result = train("generator", generator, loss_of_batch, settings, run)

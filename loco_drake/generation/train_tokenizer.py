@@ -19,9 +19,10 @@ from vector_quantize_pytorch import ResidualVQ
 
 from loco_drake.common.errors import InputError
 from loco_drake.generation.features import CONTACTS
+from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
-from loco_drake.generation.training import LoopResult, LoopSettings, train
+from loco_drake.generation.training import LoopResult, train
 from loco_drake.generation.training_motions import Clip, Library
 from loco_drake.generation.training_record import training_record
 from loco_drake.generation.windows import WINDOW, PairedWindows
@@ -189,7 +190,11 @@ def train_tokenizer(
         )
         return total, {name: loss.item() for name, loss in losses.items()}
 
-    run = {"network": asdict(config), "weights": dict(weights)}
+    run = {
+        "network": asdict(config),
+        "weights": dict(weights),
+        "motions": library.summary,
+    }
     result = train("tokenizer", learning, loss_of_batch, settings, run)
     tokenizer = learning.finish()
     if not result.stopped:

@@ -1,14 +1,10 @@
-"""The loop that trains both networks: resumable, stoppable, logged."""
+"""The loop that trains a network by gradient descent: resumable, stoppable, logged."""
 
 import json
 import math
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass
-from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -25,39 +21,19 @@ from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 
 from loco_drake.common.determinism import single_thread
-from loco_drake.common.errors import InputError
-from loco_drake.common.weights import load_into, load_weights, save_weights
+from loco_drake.common.run_folder import (
+    learning_tensors,
+    open_run,
+    options_of,
+    restore_learning,
+    settings,
+    sound,
+    stop_requests,
+)
+from loco_drake.generation.loop_settings import LoopSettings
 
 # Returns the loss and figures to log for one batch, drawn with the given generator.
 LossFunction = Callable[[np.random.Generator], tuple[Tensor, dict[str, float]]]
-
-CHECKPOINT = "checkpoint.safetensors"
-
-
-@dataclass(frozen=True)
-class LoopSettings:
-    """How to run :func:`train`.
-
-    Attributes:
-        out: folder of the checkpoint and the TensorBoard logs.
-        steps: optimizer steps in all.
-        learning_rate: the highest; it rises over the first 2 % of the steps and then
-            falls to zero as half a cosine.
-        weight_decay: of AdamW.
-        seed: of the batches, and of what torch draws.
-        resume: whether to go on from the checkpoint in ``out``.
-        checkpoint_every: steps between checkpoints.
-        log_every: steps between entries in the logs.
-    """
-
-    out: Path
-    steps: int
-    learning_rate: float
-    weight_decay: float = 0.01
-    seed: int = 0
-    resume: bool = False
-    checkpoint_every: int = 500
-    log_every: int = 20
 
 
 @dataclass(frozen=True)
@@ -79,8 +55,8 @@ def train(
     name: str,
     module: nn.Module,
     loss_of_batch: LossFunction,
-    settings: LoopSettings,
-    config: dict[str, Any],
+    config: LoopSettings,
+    run: Mapping[str, Any],
 ) -> LoopResult:
     """Trains ``module`` in place.
 
@@ -89,45 +65,59 @@ def train(
     have computed, to the last bit.
 
     Args:
-        name: "tokenizer" or "generator": names checkpoint and progress bar.
+        name: of checkpoint, weights and progress bar: "tokenizer", "generator", ...
         module: what to train.
         loss_of_batch: see :data:`LossFunction`.
-        settings: see there.
-        config: what the run depends on, as JSON; a checkpoint of a run with another
-            config is refused.
+        config: see there.
+        run: what the run depends on besides, as JSON.
 
     Raises:
-        InputError: if a checkpoint is to be resumed that is not there, damaged, or
-            of another run.
+        InputError: see :func:`loco_drake.common.run_folder.open_run`.
     """
-    config = {**config, "steps": settings.steps, "seed": settings.seed}
-    config = json.loads(json.dumps(config))  # as a checkpoint gives it back
+    config.check()
+    own = ("learning_rate", "weight_decay", "seed")
+    run = settings({**{key: getattr(config, key) for key in own}, **run})
+    run = json.loads(json.dumps(run))  # as a checkpoint gives it back
     optimizer = torch.optim.AdamW(
-        module.parameters(),
-        lr=settings.learning_rate,
-        weight_decay=settings.weight_decay,
+        module.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
     )
-    random = np.random.default_rng(settings.seed)
-    path = settings.out / CHECKPOINT
-    kind = f"{name}-checkpoint"
+    random = np.random.default_rng(config.seed)
     with (
         single_thread(),
-        _stop_requests() as stop_requested,
+        open_run(
+            config.out,
+            name,
+            f"{name}.safetensors",
+            run,
+            steps=config.steps,
+            resume=config.resume,
+            options=options_of(config),
+        ) as folder,
+        stop_requests() as stop_requested,
         torch.random.fork_rng(devices=[]),
     ):
-        torch.manual_seed(settings.seed)
+        torch.manual_seed(config.seed)
         step = 0
-        if settings.resume:
-            step = _load(path, kind, module, optimizer, random, config)
+
+        def save() -> None:
+            state = {"steps": step, "random": random.bit_generator.state}
+            folder.save(learning_tensors(module, optimizer), state)
+
+        if (saved := folder.saved) is not None:
+            restore_learning(saved, module, optimizer)
+            with sound(saved.path):
+                random.bit_generator.state = saved.state["random"]
+            step = saved.state["steps"]
         module.train()
         last = math.nan
-        with _progress() as progress, _logs(settings.out, step) as logs:
-            bar = progress.add_task(name, total=settings.steps, completed=step, note="")
-            while step < settings.steps and not stop_requested.is_set():
+        # The logs overwrite what a lost run logged later.
+        writer = SummaryWriter(str(config.out / "logs"), purge_step=step)
+        with _progress() as progress, closing(writer) as logs:
+            bar = progress.add_task(name, total=config.steps, completed=step, note="")
+            while step < config.steps and not stop_requested.is_set():
+                rate = config.learning_rate * _schedule(step / config.steps)
                 for group in optimizer.param_groups:
-                    group["lr"] = settings.learning_rate * _schedule(
-                        step / settings.steps
-                    )
+                    group["lr"] = rate
                 loss, metrics = loss_of_batch(random)
                 optimizer.zero_grad()
                 loss.backward()  # type: ignore[no-untyped-call]
@@ -136,95 +126,19 @@ def train(
                 step += 1
                 last = loss.item()
                 progress.update(bar, completed=step, note=f"loss {last:.4f}")
-                if step % settings.log_every == 0:
-                    logs.add_scalar("loss", last, step)
-                    for key, value in metrics.items():
+                if step % config.log_every == 0:
+                    for key, value in {"loss": last, **metrics}.items():
                         logs.add_scalar(key, value, step)
-                if step % settings.checkpoint_every == 0:
-                    _save(path, kind, module, optimizer, random, config, step)
-        _save(path, kind, module, optimizer, random, config, step)
+                if step % config.checkpoint_every == 0:
+                    save()
+        save()
         module.eval()
-    return LoopResult(step, step < settings.steps, last)
+    return LoopResult(step, step < config.steps, last)
 
 
 def _schedule(progress: float) -> float:
     """Returns the learning rate as a share of the highest, ``progress`` in [0, 1)."""
     return min(progress / 0.02 + 0.01, 1.0) * 0.5 * (1 + math.cos(math.pi * progress))
-
-
-def _save(
-    path: Path,
-    kind: str,
-    module: nn.Module,
-    optimizer: torch.optim.Optimizer,
-    random: np.random.Generator,
-    config: dict[str, Any],
-    step: int,
-) -> None:
-    tensors = {f"module.{name}": t for name, t in module.state_dict().items()}
-    for index, state in optimizer.state_dict()["state"].items():
-        tensors |= {f"optimizer.{index}.{key}": t for key, t in state.items()}
-    tensors["torch_random_state"] = torch.get_rng_state()
-    header = {"run": config, "step": step, "random": random.bit_generator.state}
-    save_weights(path, kind, tensors, header)
-
-
-def _load(
-    path: Path,
-    kind: str,
-    module: nn.Module,
-    optimizer: torch.optim.Optimizer,
-    random: np.random.Generator,
-    config: dict[str, Any],
-) -> int:
-    """Returns the steps taken, all else restored in place."""
-    tensors, header = load_weights(path, kind)
-    try:
-        run, step, state = dict(header["run"]), int(header["step"]), header["random"]
-        torch_state = tensors.pop("torch_random_state")
-    except (KeyError, TypeError, ValueError):
-        raise InputError(f"{path} has a damaged checkpoint header.") from None
-    changed = [key for key in config | run if config.get(key) != run.get(key)]
-    if changed:
-        raise InputError(
-            f"{path} is of a run with other settings ({', '.join(sorted(changed))}); "
-            f"resume with the same ones, or train anew in another folder."
-        )
-    moments: dict[int, dict[str, Tensor]] = {}
-    for name in [name for name in tensors if name.startswith("optimizer.")]:
-        _, index, key = name.split(".")
-        moments.setdefault(int(index), {})[key] = tensors.pop(name)
-    load_into(module, {n.removeprefix("module."): t for n, t in tensors.items()}, path)
-    try:
-        groups = optimizer.state_dict()["param_groups"]
-        optimizer.load_state_dict({"state": moments, "param_groups": groups})
-        random.bit_generator.state = state
-        torch.set_rng_state(torch_state)
-    except (KeyError, TypeError, ValueError, RuntimeError):
-        raise InputError(f"{path} does not fit the network it is of.") from None
-    return step
-
-
-@contextmanager
-def _stop_requests() -> Iterator[threading.Event]:
-    """Yields an event that Ctrl-C and SIGTERM set; a second Ctrl-C interrupts."""
-    requested = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield requested  # only the main thread may handle signals
-        return
-
-    def handle(number: int, frame: FrameType | None) -> None:
-        if requested.is_set():
-            raise KeyboardInterrupt
-        requested.set()
-
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    previous = [signal.signal(number, handle) for number in numbers]
-    try:
-        yield requested
-    finally:
-        for number, handler in zip(numbers, previous, strict=True):
-            signal.signal(number, handler)
 
 
 def _progress() -> Progress:
@@ -237,13 +151,3 @@ def _progress() -> Progress:
         console=Console(stderr=True),
         refresh_per_second=2,
     )
-
-
-@contextmanager
-def _logs(folder: Path, step: int) -> Iterator[SummaryWriter]:
-    """Yields a TensorBoard writer that overwrites what a lost run logged later."""
-    writer = SummaryWriter(str(folder / "logs"), purge_step=step)
-    try:
-        yield writer
-    finally:
-        writer.close()

@@ -65,6 +65,12 @@ class Library:
         """The robots in ``train``, sorted by name."""
         return tuple(sorted({clip.robot for clip in self.train}))
 
+    @property
+    def summary(self) -> str:
+        """How much there is to train on: another library has another summary."""
+        frames = sum(len(clip) for clip in self.train)
+        return f"{len(self.train)} clips of {frames} frames"
+
 
 def load_library(*folders: Path) -> Library:
     """Reads every Motion file under the folders.

@@ -1,23 +1,19 @@
 """What weights were trained on, in the header of their file."""
 
 from collections.abc import Iterable
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from loco_drake import __version__
 from loco_drake.common.weights import load_weights
+from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.training_motions import Library, recording_name
 from loco_drake.motion.motion import FPS, Motion
 
-if TYPE_CHECKING:  # it loads what only training needs
-    from loco_drake.generation.training import LoopSettings
-
-# Settings that change where a run writes, but not what it learns.
-_OF_THE_RUN = ("out", "resume", "checkpoint_every", "log_every")
+_SETTINGS = ("steps", "learning_rate", "weight_decay", "seed")
 
 
-def training_record(library: Library, settings: "LoopSettings") -> dict[str, Any]:
+def training_record(library: Library, settings: LoopSettings) -> dict[str, Any]:
     """Returns the record of a training, as JSON.
 
     Returns:
@@ -36,7 +32,7 @@ def training_record(library: Library, settings: "LoopSettings") -> dict[str, Any
             for name, of_robot in sorted(seconds.items())
         },
         "held_out": sorted({clip.recording for clip in library.held_out}),
-        **{k: v for k, v in asdict(settings).items() if k not in _OF_THE_RUN},
+        **{name: getattr(settings, name) for name in _SETTINGS},
         "loco_drake": __version__,
     }
 

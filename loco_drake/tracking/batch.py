@@ -36,7 +36,7 @@ class TrackingBatch:
         plan: index of the plan that each robot follows, shape (B,).
         start: sample of its plan that each robot started at, shape (B,).
         sample: sample of its plan that each robot is at, shape (B,).
-        penalty: what each robot's last step loses by homing and falls, shape (B,).
+        penalty: what each robot's last step loses by distance and falls, (B,).
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class TrackingBatch:
         terms = reward_terms(self._robot, wanted, toes, self._state, self._R_WB)
         gap = (self._state - wanted)[POSITION][:, :2]
         fallen = has_fallen(self._robot, split(self._state)[0], self._R_WB)
-        self.penalty = self._config.homing * np.linalg.norm(gap, axis=1)
+        self.penalty = self._config.position_penalty * np.linalg.norm(gap, axis=1)
         self.penalty += self._config.fall_cost * fallen
         lost = fallen | has_strayed(self._config.termination, self._state, wanted)
         return terms, lost, ~lost & (self.sample >= self._last)

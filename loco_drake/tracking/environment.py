@@ -26,10 +26,10 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
     Observations are those of :mod:`loco_drake.control.observation`, actions those of
     :class:`loco_drake.systems.control.JointTargets`, rewards the sum of
     :func:`loco_drake.control.reward.reward_terms`, at most 1 a step, less
-    what the configuration's ``homing`` and ``fall_cost`` take, by default nothing. An
-    episode starts in a state of the plan (reference state initialization, Peng et al.
-    2018), terminates when the robot falls or loses its plan, and is truncated when its
-    time or its plan is over.
+    what the configuration's ``position_penalty`` and ``fall_cost`` take, by default
+    nothing. An episode starts in a state of the plan (reference state initialization,
+    Peng et al. 2018), terminates when the robot falls or loses its plan, and is
+    truncated when its time or its plan is over.
 
     ``info`` holds the reward's terms by name, and the plan and sample that the episode
     started at. ``reset(options={"plan": i, "sample": k})`` chooses them.

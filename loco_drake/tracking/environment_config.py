@@ -1,12 +1,16 @@
 """What a tracking environment is, but for its plans."""
 
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 
+from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.common.rotations import quat_multiply, quat_rotate, yaw_quat
 from loco_drake.models.plant import PlantConfig
+from loco_drake.models.robots import get_robot
 from loco_drake.tracking.randomization import RandomizationConfig
 from loco_drake.tracking.terminations import TerminationConfig
 
@@ -46,43 +50,56 @@ class ResetNoise:
 
 @dataclass(kw_only=True)
 class EnvironmentConfig:
-    """An environment, but for its plans.
-
-    Attributes:
-        robot: name of the robot.
-        plant: contact, step and friction.
-        termination: when an episode ends early.
-        episode_steps: an episode is truncated after this many steps.
-        reset_noise: how far from the plan's state episodes start.
-        homing: what a step loses in training for each metre that the base is beside
-            the plan's, 1/m. The reward's own term for it is flat beyond half a metre,
-            so that nothing calls a robot back that strayed further. It is no part of
-            returns, and neither is what a fall costs.
-        fall_cost: what a fall costs in training beyond the steps that it loses, of
-            which discounting sees some thirty; a judged episode can lose 500.
-        randomization: in what each episode's world differs from the model.
-    """
+    """An environment, but for its plans."""
 
     robot: str = "go2"
+    """Robot: go2 or a1."""
     plant: PlantConfig = field(default_factory=PlantConfig)
+    """Contact solver, time step and friction."""
     termination: TerminationConfig = field(default_factory=TerminationConfig)
+    """How far from its plan a robot may be before its episode ends."""
     episode_steps: int = 200
+    """Steps after which an episode is truncated."""
     reset_noise: ResetNoise = field(default_factory=ResetNoise)
-    homing: float = 0.0
+    """How far from the plan's state episodes start, as standard deviations."""
+    position_penalty: Annotated[float, tyro.conf.arg(aliases=("--homing",))] = 0.0
+    """What a step loses in training for each metre that the base is beside its plan,
+    1/m: the reward's own term for it is flat beyond half a metre. It is no part of the
+    returns that are reported."""
     fall_cost: float = 0.0
+    """What a fall costs in training beyond the steps that it loses, in steps done
+    perfectly: discounting sees some thirty, a judged episode can lose 500. It is no
+    part of the returns either."""
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
+    """In what each episode's world differs from the model; a range is two numbers."""
 
-    def without_position(self) -> "EnvironmentConfig":
-        """Returns a copy for policies that do not know where in the world they are.
+    def check(self) -> None:
+        """Raises InputError unless every part is sound."""
+        robot = get_robot(self.robot)
+        self.plant.check()
+        self.termination.check()
+        check_at_least("episode_steps", self.episode_steps, 1)
+        noise = {f"reset_noise.{k}": v for k, v in vars(self.reset_noise).items()}
+        for name in ("position_penalty", "fall_cost"):
+            noise[name] = getattr(self, name)
+        for name, value in noise.items():
+            if not 0 <= value < np.inf:
+                option = "--" + name.replace("_", "-")
+                raise InputError(f"{option} must be 0 or more, not {value}.")
+        self.randomization.check(robot, self.plant)
 
-        They cannot help drifting from the plan, so that episodes do not end before
-        1 m of it, which a robot that stands still reaches all the same; and they need
-        not learn to come back from beside it.
+    def known_to(self, *, privileged: bool) -> "EnvironmentConfig":
+        """Returns what to train a policy in that may not know where in the world it is.
+
+        Such a policy cannot help drifting from the plan, so that episodes do not end
+        before 1 m of it, which a robot that stands still reaches all the same; and it
+        need not learn to come back from beside it.
         """
+        if privileged:
+            return self
+        position = max(self.termination.position, 1.0)
         return replace(
             self,
-            termination=replace(
-                self.termination, position=max(self.termination.position, 1.0)
-            ),
+            termination=replace(self.termination, position=position),
             reset_noise=replace(self.reset_noise, position=0.0),
         )

@@ -1,10 +1,13 @@
 """What a training log says of how returns grew."""
 
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from loco_drake.common.files import atomic_path
 
 PROGRESS = "progress.jsonl"
 POINTS = 200
@@ -47,6 +50,19 @@ def learning_curve(log: Path, points: int = POINTS) -> dict[str, Any]:
             for label in labels
         },
     }
+
+
+def trim_log(log: Path, steps: int) -> None:
+    """Leaves out of a log what was learned and lost: all later than ``steps``."""
+    if not log.exists():
+        return
+    kept = []
+    for line in log.read_text(errors="replace").splitlines():
+        with suppress(ValueError, LookupError, TypeError):  # half a line
+            if json.loads(line)["steps"] <= steps:
+                kept.append(line + "\n")
+    with atomic_path(log) as temporary:
+        temporary.write_text("".join(kept))
 
 
 def _rounded(value: float | None) -> float | None:

@@ -3,11 +3,13 @@
 from dataclasses import dataclass, field
 from typing import Any, cast
 
+import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
 
+from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.control.actor import OBSERVATION_CLIP, Actor, ActorConfig
 from loco_drake.control.symmetry import mirror_observations
 from loco_drake.tracking.symmetric_policy import (
@@ -19,37 +21,61 @@ from loco_drake.tracking.symmetric_policy import (
 
 @dataclass(kw_only=True)
 class PpoConfig:
-    """Hyper-parameters.
-
-    Attributes:
-        batch: environment steps between updates.
-        minibatch: steps in a gradient step.
-        epochs: passes over a batch.
-        gamma: discount a step.
-        gae_lambda: of generalized advantage estimation.
-        clip: range of the probability ratio.
-        actor_rate: learning rate of the actor to start with.
-        target_kl: divergence that an update should have; the actor's learning rate
-            follows it (Schulman et al. 2017; Rudin et al. 2022).
-        critic_rate: learning rate of the critic, which has nothing to diverge from.
-        log_std: initial log standard deviation of the actions.
-        hidden: widths of the hidden layers of both networks.
-        privileged: whether the actor sees all of the observation, or only what a robot
-            outside simulation knows; the critic sees all.
-    """
+    """How to learn."""
 
     batch: int = 4096
+    """Environment steps between updates; what is saved lags no more behind."""
     minibatch: int = 1024
+    """Environment steps in a gradient step, of those of a batch."""
     epochs: int = 5
+    """Passes over a batch."""
     gamma: float = 0.97
+    """Discount a step."""
     gae_lambda: float = 0.95
+    """Of generalized advantage estimation."""
     clip: float = 0.2
+    """Range of the probability ratio."""
     actor_rate: float = 5e-4
+    """Learning rate of the actor to start with."""
     target_kl: float = 0.02
+    """Divergence that an update should have; the actor's learning rate follows it
+    (Schulman et al. 2017; Rudin et al. 2022)."""
     critic_rate: float = 1e-3
+    """Learning rate of the critic, which has nothing to diverge from."""
     log_std: float = -0.7
+    """Initial log standard deviation of the actions."""
     hidden: list[int] = field(default_factory=lambda: [256, 128])
+    """Widths of the hidden layers of actor and critic each."""
     privileged: bool = True
+    """Whether the policy sees where in the world the base is and how fast it moves,
+    which a robot outside simulation does not know well; the critic always does."""
+
+    def check(self, environments: int) -> None:
+        """Raises InputError unless it fits so many environments."""
+        if self.batch < 2 * environments:
+            raise InputError(
+                f"--batch must be at least {2 * environments}, two steps of each of "
+                f"{environments} environments, not {self.batch}."
+            )
+        for name in ("minibatch", "epochs"):
+            check_at_least(name, getattr(self, name), 1)
+        if not self.hidden or min(self.hidden) < 1:
+            raise InputError(f"--hidden must be widths above 0, not {self.hidden}.")
+        for name, most in (
+            ("gamma", 1.0),
+            ("gae_lambda", 1.0),
+            ("clip", 1.0),
+            ("actor_rate", 1.0),
+            ("target_kl", np.inf),
+            ("critic_rate", 1.0),
+        ):
+            value = getattr(self, name)
+            if not 0 < value <= most or np.isinf(value):
+                limit = f" and at most {most:g}" if np.isfinite(most) else ""
+                option = "--" + name.replace("_", "-")
+                raise InputError(f"{option} must be above 0{limit}, not {value}.")
+        if not np.isfinite(self.log_std):
+            raise InputError(f"--log-std must be a number, not {self.log_std}.")
 
 
 class ScaleReward(VecEnvWrapper):
@@ -136,7 +162,7 @@ def make_ppo(
         normalized,
         learning_rate=config.actor_rate,
         n_steps=config.batch // environment.num_envs,
-        batch_size=config.minibatch,
+        batch_size=min(config.minibatch, config.batch),
         n_epochs=config.epochs,
         gamma=config.gamma,
         gae_lambda=config.gae_lambda,

@@ -2,60 +2,77 @@
 
 import json
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from threading import Event
+from typing import Annotated, Any
 
 import numpy as np
 import torch
+import tyro
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from torch import Tensor
 
-from loco_drake.common.errors import InputError
-from loco_drake.control.actor import ActorConfig, save_actor
-from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
-from loco_drake.control.plan import Plan
-from loco_drake.models.robots import get_robot
-from loco_drake.motion.gaits import ROW_LABELS
-from loco_drake.tracking.checkpoint import (
-    load_checkpoint,
-    restore,
-    save_checkpoint,
-    start_from,
+from loco_drake.common.determinism import single_thread
+from loco_drake.common.errors import InputError, check_at_least
+from loco_drake.common.run_folder import (
+    Checkpoint,
+    RunFolder,
+    learning_tensors,
+    load_module,
+    open_run,
+    options_of,
+    read_checkpoint,
+    restore_learning,
+    settings,
+    sound,
+    stop_requests,
 )
+from loco_drake.control.actor import ActorConfig, save_actor
+from loco_drake.control.observation import OBSERVATION_LAYOUT
+from loco_drake.control.plan import Plan
+from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.tracking.environment_config import EnvironmentConfig
-from loco_drake.tracking.learning_curve import PROGRESS, learning_curve
+from loco_drake.tracking.learning_curve import PROGRESS, learning_curve, trim_log
 from loco_drake.tracking.ppo import AdaptivePPO, PpoConfig, export_actor, make_ppo
 from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.workers import WorkerVecEnv
 
-CHECKPOINT = "checkpoint.safetensors"
+NAME = "tracker"
 POLICY = "policy.safetensors"
 
 _LAYOUT = [list(part) for part in OBSERVATION_LAYOUT]
+# What the sampler knows of labels and plans.
+_SCORES = ("scores", "shares", "plan_scores", "plan_shares")
 
 
 @dataclass(kw_only=True)
 class TrainingConfig:
-    """How to train a tracker.
-
-    Attributes:
-        steps: environment steps in all, those before a resume included.
-        workers: processes that simulate.
-        per_worker: environments in each.
-        seed: of everything random.
-        environment: what is simulated.
-        ppo: how is learned.
-    """
+    """How to train a tracker."""
 
     steps: int = 2_000_000
+    """Environment steps in all, of 20 ms each, those before a resume included."""
     workers: int = 2
+    """Processes that simulate."""
     per_worker: int = 8
+    """Environments in each process."""
     seed: int = 0
-    environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
-    ppo: PpoConfig = field(default_factory=PpoConfig)
+    """Of everything random."""
+    environment: Annotated[EnvironmentConfig, tyro.conf.arg(name="")] = field(
+        default_factory=EnvironmentConfig
+    )
+    """What is simulated."""
+    ppo: Annotated[PpoConfig, tyro.conf.arg(name="")] = field(default_factory=PpoConfig)
+    """How is learned."""
+
+    def check(self) -> None:
+        """Raises InputError unless a training can begin."""
+        for name in ("workers", "per_worker"):
+            check_at_least(name, getattr(self, name), 1)
+        self.environment.check()
+        self.ppo.check(self.workers * self.per_worker)
 
 
 @dataclass(frozen=True)
@@ -80,6 +97,7 @@ def train_tracker(
     *,
     resume: bool = False,
     first: Path | None = None,
+    options: Mapping[str, Any] | None = None,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> dict[str, Any]:
     """Trains a policy to follow ``plans``.
@@ -96,6 +114,7 @@ def train_tracker(
         resume: go on from the checkpoint in ``folder``.
         first: a checkpoint of any training, whose networks and normalizer are those to
             begin with; all else begins anew.
+        options: of the command, for :func:`.run_folder.open_run`.
         report: called after each batch.
 
     Returns:
@@ -103,68 +122,71 @@ def train_tracker(
         and the learning curve of all runs (:mod:`.learning_curve`).
 
     Raises:
-        InputError: if there is nothing to resume or to begin with, or what there is was
-            trained with other networks or observations, or, to resume, for another
-            robot.
+        InputError: see :func:`.run_folder.open_run`; or if there is nothing to begin
+            with, or it has other networks or observations.
         ChildProcessError: if a worker process is killed.
     """
-    folder = Path(folder)
-    fixed = {
-        "robot": config.environment.robot,
-        "hidden": config.ppo.hidden,
-        "privileged": config.ppo.privileged,
-    }
-    world = config.environment
-    world.randomization.check(get_robot(world.robot), world.plant)
+    config.check()
     if resume and first is not None:
         raise InputError("Give either a checkpoint to start from or resume, not both.")
-    tensors, saved = None, None
-    beginning: tuple[dict[str, Tensor], dict[str, Any]] | None = None
-    if resume:
-        tensors, saved = _load(folder / CHECKPOINT, fixed)
-    if first is not None:
-        beginning = _load(first, {"hidden": config.ppo.hidden})
-    folder.mkdir(parents=True, exist_ok=True)
-    for unfinished in folder.glob(".*.safetensors"):
-        unfinished.unlink()  # what a training was writing when it was killed
-
-    start = time.monotonic()
-    steps_before = 0 if saved is None else int(saved["steps"])
+    own = options_of(config)
+    own = {field.name: own[field.name] for field in fields(TrainingConfig)}
+    run = {
+        **settings(own, "steps"),
+        "references": f"{len(plans)} motions of {sum(map(len, plans))} samples",
+        "observation_layout": _LAYOUT,
+    }
+    beginning = None if first is None else _beginning(first, config.ppo.hidden)
     sampler = PlanSampler(plans, config.seed)
-    environment = WorkerVecEnv(
-        plans,
-        config.environment,
-        sampler,
-        workers=config.workers,
-        per_worker=config.per_worker,
-        # Episodes after a resume are new ones.
-        seed=config.seed + steps_before,
-    )
-    try:
-        learner = make_ppo(environment, config.ppo, config.seed)
-        if tensors is not None and saved is not None:
-            restore(learner, sampler, tensors, saved)
-        if beginning is not None:
-            start_from(learner, *beginning)
-        learner.set_logger(Logger(None, [TensorBoardOutputFormat(str(folder))]))
-        saver = _Saver(folder, sampler, config, fixed, report)
-        interrupted = False
+    start = time.monotonic()
+    with (
+        single_thread(),
+        open_run(
+            Path(folder),
+            NAME,
+            POLICY,
+            run,
+            steps=config.steps,
+            resume=resume,
+            options=options or own,
+        ) as held,
+    ):
+        steps_before = held.saved.state["steps"] if held.saved else 0
+        log = Path(folder) / PROGRESS
+        trim_log(log, steps_before)
+        environment = WorkerVecEnv(
+            plans,
+            config.environment.known_to(privileged=config.ppo.privileged),
+            sampler,
+            workers=config.workers,
+            per_worker=config.per_worker,
+            # Episodes after a resume are new ones.
+            seed=config.seed + steps_before,
+        )
         try:
-            if learner.num_timesteps < config.steps:
-                learner.learn(
-                    config.steps - learner.num_timesteps,
-                    callback=saver,
-                    reset_num_timesteps=False,
-                )
-        except KeyboardInterrupt:
-            interrupted = True
-        saver.save(learner)
-    finally:
-        environment.close()
-    log = folder / PROGRESS
+            learner = make_ppo(environment, config.ppo, config.seed)
+            if beginning is not None:
+                _start_from(learner, beginning)
+            if held.saved is not None:
+                _restore(learner, sampler, held.saved)
+            writer = TensorBoardOutputFormat(str(folder))
+            learner.set_logger(Logger(None, [writer]))
+            with stop_requests() as stop_requested:
+                saver = _Saver(held, log, sampler, config, report, stop_requested)
+                if learner.num_timesteps < config.steps:
+                    learner.learn(
+                        config.steps - learner.num_timesteps,
+                        callback=saver,
+                        reset_num_timesteps=False,
+                    )
+            interrupted = learner.num_timesteps < config.steps
+            if not interrupted:
+                saver.save(learner)
+        finally:
+            environment.close()
     return {
         "robot": config.environment.robot,
-        "steps": learner.num_timesteps,
+        "steps": saver.saved_steps or steps_before,
         "wall_clock_s": time.monotonic() - start,
         "interrupted": interrupted,
         "scores": sampler.score_by_label(),
@@ -172,100 +194,130 @@ def train_tracker(
     }
 
 
-def _load(
-    checkpoint: Path, fixed: dict[str, Any]
-) -> tuple[dict[str, Tensor], dict[str, Any]]:
-    """Returns tensors and state of a checkpoint that agrees with what is ``fixed``."""
-    tensors, header = load_checkpoint(checkpoint)
-    own = {"privileged": True, **header["config"]["fixed"]}
-    own = {name: own[name] for name in fixed}
-    if own != fixed:
-        raise InputError(f"{checkpoint} is of {own}, not of {fixed}.")
-    layout = header["config"].get("observation_layout", _LAYOUT)
-    if layout != _LAYOUT or len(tensors["normalizer/mean"]) != OBSERVATION_SIZE:
-        raise InputError(f"{checkpoint} is of another observation layout.")
-    return tensors, header["state"]
+def _beginning(path: Path, hidden: list[int]) -> Checkpoint:
+    """Returns a checkpoint whose networks are like those to be trained."""
+    saved = read_checkpoint(path, NAME)
+    with sound(path):
+        own, layout = saved.run["hidden"], saved.run["observation_layout"] or _LAYOUT
+    if own != hidden:
+        raise InputError(f"{path} is of networks with --hidden {own}, not {hidden}.")
+    if layout != _LAYOUT:
+        raise InputError(f"{path} is of another observation layout.")
+    return saved
+
+
+def _tensors(learner: AdaptivePPO, sampler: PlanSampler) -> dict[str, Tensor]:
+    tensors = learning_tensors(learner.policy, learner.policy.optimizer)
+    statistics = learner.statistics
+    tensors["normalizer/mean"] = torch.from_numpy(statistics.mean)
+    tensors["normalizer/variance"] = torch.from_numpy(statistics.var)
+    for name in _SCORES:
+        # Plans that have not been drawn yet have none: NaN, which no file may hold.
+        scores = np.nan_to_num(getattr(sampler, name), nan=-1.0)
+        tensors[f"sampler/{name}"] = torch.from_numpy(scores)
+    # stable-baselines3 shuffles its minibatches with numpy's global generator.
+    _, keys, *_ = np.random.get_state()  # noqa: NPY002
+    tensors["random/numpy"] = torch.from_numpy(np.asarray(keys).astype(np.int64))
+    return tensors
+
+
+def _state(learner: AdaptivePPO, sampler: PlanSampler) -> dict[str, Any]:
+    _, _, position, has_gauss, gauss = np.random.get_state()  # noqa: NPY002
+    return {
+        "steps": learner.num_timesteps,
+        "learning_rate": learner.rate,
+        "normalizer_count": float(learner.statistics.count),
+        "sampler_random": sampler.random.bit_generator.state,
+        "numpy_random": [int(position), int(has_gauss), float(gauss)],
+    }
+
+
+def _start_from(learner: AdaptivePPO, saved: Checkpoint) -> None:
+    """Gives ``learner`` the networks and the normalizer of a checkpoint, no more."""
+    load_module(saved, learner.policy)
+    with sound(saved.path):
+        statistics = learner.statistics
+        statistics.mean = saved.tensors["normalizer/mean"].numpy()
+        statistics.var = saved.tensors["normalizer/variance"].numpy()
+        statistics.count = saved.state["normalizer_count"]
+
+
+def _restore(learner: AdaptivePPO, sampler: PlanSampler, saved: Checkpoint) -> None:
+    """Puts ``learner`` and ``sampler`` where the checkpoint left them."""
+    _start_from(learner, saved)
+    restore_learning(saved, learner.policy, learner.policy.optimizer)
+    with sound(saved.path):
+        for name in _SCORES:
+            scores = saved.tensors[f"sampler/{name}"].numpy()
+            getattr(sampler, name)[:] = np.where(scores < 0, np.nan, scores)
+        sampler.random.bit_generator.state = saved.state["sampler_random"]
+        position, has_gauss, gauss = saved.state["numpy_random"]
+        keys = saved.tensors["random/numpy"].numpy().astype(np.uint32)
+        np.random.set_state(("MT19937", keys, position, has_gauss, gauss))  # noqa: NPY002
+        learner.num_timesteps = saved.state["steps"]
+        learner.rate = saved.state["learning_rate"]
 
 
 class _Saver(BaseCallback):
-    """Saves and reports after each update."""
+    """Saves and reports after each update, and stops when asked to."""
 
     def __init__(
         self,
-        folder: Path,
+        run: RunFolder,
+        log: Path,
         sampler: PlanSampler,
         config: TrainingConfig,
-        fixed: dict[str, Any],
         report: Callable[[Progress], None],
+        stop_requested: Event,
     ) -> None:
         super().__init__()
-        self._folder = folder
+        self.saved_steps = 0
+        self._run = run
+        self._log = log
         self._sampler = sampler
         self._config = config
-        self._fixed = fixed
         self._report = report
+        self._stop_requested = stop_requested
         self._first = True
         self._start = time.monotonic()
 
-    @property
-    def _learner(self) -> AdaptivePPO:
-        assert isinstance(self.model, AdaptivePPO)
-        return self.model
-
     def _on_step(self) -> bool:
-        return True
+        return not self._stop_requested.is_set()
 
     def _on_rollout_start(self) -> None:
         # The update for the last batch has just been done.
         if self._first:
             self._first = False
             return
+        assert isinstance(self.model, AdaptivePPO)
         scores = self._sampler.score_by_label()
         for label, score in scores.items():
             self.logger.record(f"return/{label}", score)
-        self.logger.record("train/std", float(_std(self._learner)))
-        episodes = self._learner.ep_info_buffer
+        with torch.no_grad():
+            deviation = float(self.model.policy.log_std.exp().mean())
+        self.logger.record("train/std", deviation)
+        episodes = self.model.ep_info_buffer
         if episodes:
             lengths = [episode["l"] for episode in episodes]
             self.logger.record("return/episode_steps", float(np.mean(lengths)))
-        logged = {
-            name: value
-            for name, value in self.logger.name_to_value.items()
-            if isinstance(value, int | float | np.floating)
-        }
+        line = {"steps": self.num_timesteps, "seconds": time.monotonic() - self._start}
+        for name, value in self.logger.name_to_value.items():
+            if isinstance(value, int | float | np.floating):
+                line[name] = float(value)
         self.logger.dump(self.num_timesteps)
-        with (self._folder / PROGRESS).open("a") as log:
-            line = {
-                "steps": self.num_timesteps,
-                "seconds": time.monotonic() - self._start,
-                **{name: float(value) for name, value in logged.items()},
-            }
+        with self._log.open("a") as log:
             log.write(json.dumps(line) + "\n")
-        self.save(self._learner)
+        self.save(self.model)
         self._report(Progress(self.num_timesteps, self._config.steps, scores))
 
     def save(self, learner: AdaptivePPO) -> None:
         """Writes the checkpoint and the policy."""
-        save_checkpoint(
-            self._folder / CHECKPOINT,
-            learner,
-            self._sampler,
-            {
-                "fixed": self._fixed,
-                "observation_layout": _LAYOUT,
-                "training": asdict(self._config),
-            },
-        )
-        labels = [str(ROW_LABELS[i]) for i in self._sampler.present]
-        actor_config = ActorConfig(
+        self._run.save(_tensors(learner, self._sampler), _state(learner, self._sampler))
+        self.saved_steps = learner.num_timesteps
+        actor = ActorConfig(
             robot=self._config.environment.robot,
-            labels=labels,
+            labels=[str(ROW_LABELS[i]) for i in self._sampler.present],
             hidden=self._config.ppo.hidden,
             privileged=self._config.ppo.privileged,
         )
-        save_actor(export_actor(learner, actor_config), self._folder / POLICY)
-
-
-def _std(learner: AdaptivePPO) -> float:
-    with torch.no_grad():
-        return float(learner.policy.log_std.exp().mean())
+        save_actor(export_actor(learner, actor), self._log.parent / POLICY)

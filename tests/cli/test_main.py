@@ -171,17 +171,17 @@ WRONG = {
     "report --replay-seconds 0": DURATION,
     "report --seed -1": "--seed must be 0 or more, not -1",
     "train tracker --references FILES/empty --robot spot": "the choices are go2, a1",
-    "train tracker --references FILES/empty --minibatch 0": "minibatch must be",
+    "train tracker --references FILES/empty --minibatch 0": "--minibatch must be",
     "train tracker --references FILES/empty --batch 9": "--batch must be at least 32",
-    "train tracker --references FILES/empty --steps 0": "steps must be at least 1",
+    "train tracker --references FILES/empty --steps 0": "--steps must be 1 or more",
     "train tracker --references FILES/empty --termination.position 0": (
         "position must be above 0, not 0"
     ),
     "train tracker --references FILES/empty --homing=-1": (
-        "--homing must be at least 0, not -1"
+        "--position-penalty must be 0 or more, not -1"
     ),
     "train tracker --references FILES/empty --fall-cost=-2": (
-        "--fall-cost must be at least 0, not -2"
+        "--fall-cost must be 0 or more, not -2"
     ),
 }
 

@@ -3,10 +3,10 @@ import json
 import pytest
 
 from loco_drake.cli.main import main
+from loco_drake.common.run_folder import read_checkpoint
 from loco_drake.control.actor import load_actor
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import save_motion
-from loco_drake.tracking.checkpoint import load_checkpoint
 from loco_drake.tracking.randomization import STANDARD
 from tests.synthetic_motion import synthetic_motion
 
@@ -35,16 +35,13 @@ def test_options_reach_the_training(references, tmp_path, capsys):
     assert not load_actor(
         out / "policy.safetensors", get_robot("go2")
     ).config.privileged
-    _, header = load_checkpoint(out / "checkpoint.safetensors")
-    environment = header["config"]["training"]["environment"]
-    randomization = environment["randomization"]
-    assert randomization["payload"] == [2.0, 2.0]
-    assert randomization["latency"] == list(STANDARD.latency)
-    assert environment["termination"]["position"] == 1.0
+    run = read_checkpoint(out / "checkpoint.safetensors", "tracker").run
+    assert run["randomization.payload"] == [2.0, 2.0]
+    assert run["randomization.latency"] == list(STANDARD.latency)
     capsys.readouterr()
-    resumed = ["--resume", "--steps", "64", "--out", str(out)]
+    resumed = ["--resume", "--privileged", "--out", str(out)]
     assert train(references, *resumed) == 2
-    assert "'privileged': False" in capsys.readouterr().err
+    assert "has --privileged False, not True;" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from loco_drake.evaluation.classifier import (
 from loco_drake.evaluation.recognition import LinearRecognizer, TransformerRecognizer
 from loco_drake.evaluation.samples import make_samples
 from loco_drake.evaluation.train_classifier import class_indices, train_classifier
-from loco_drake.generation.training import LoopSettings
+from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS, parse_label
 from tests.varied_motion import varied_motions

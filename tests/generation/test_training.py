@@ -13,6 +13,7 @@ from loco_drake.generation.generator import (
     duration_bin,
     load_generator,
 )
+from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.motion_model import MotionModel
 from loco_drake.generation.speed_rank import BINS, speed_edges
 from loco_drake.generation.tokenizer import TokenizerConfig, load_tokenizer
@@ -29,7 +30,6 @@ from loco_drake.generation.train_tokenizer import (
     energy_error,
     train_tokenizer,
 )
-from loco_drake.generation.training import LoopSettings
 from loco_drake.generation.training_motions import Clip, load_library
 from loco_drake.motion.gaits import parse_label
 
@@ -146,13 +146,13 @@ def test_ctrl_c_works_as_before_afterwards(library, tmp_path):
 def test_a_checkpoint_of_another_run_is_refused(library, tmp_path):
     settings = LoopSettings(tmp_path, 2, 3e-3)
     train_tokenizer(library, TINY, settings)
-    with pytest.raises(InputError, match=r"other settings.*seed"):
+    with pytest.raises(InputError, match="has --seed 0, not 1"):
         train_tokenizer(library, TINY, replace(settings, seed=1, resume=True))
-    with pytest.raises(InputError, match=r"other settings.*network"):
+    with pytest.raises(InputError, match=r"network\.width 24, not 32"):
         train_tokenizer(
             library, replace(TINY, width=32), replace(settings, resume=True)
         )
-    with pytest.raises(InputError, match="no tokenizer-checkpoint"):
+    with pytest.raises(InputError, match="There is no run to resume"):
         train_tokenizer(
             library, TINY, replace(settings, out=tmp_path / "none", resume=True)
         )

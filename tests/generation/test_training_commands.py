@@ -60,7 +60,7 @@ def test_from_motions_to_new_motions_by_three_commands(motions, tmp_path):
     [
         ({"steps": 0}, "--steps"),
         ({"learning_rate": float("nan")}, "--learning-rate"),
-        ({"resume": True}, "no tokenizer-checkpoint weights"),
+        ({"resume": True}, "There is no run to resume"),
     ],
 )
 def test_bad_options_are_refused(options, message, motions, tmp_path):

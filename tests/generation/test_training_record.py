@@ -22,9 +22,10 @@ def weights(motions, tmp_path_factory):
     folder = tmp_path_factory.mktemp("weights")
     TrainTokenizer(motions=(motions,), out=folder, steps=2, seed=5).run()
     tokenizer = folder / "tokenizer.safetensors"
-    options = {"out": folder, "tokenizer": tokenizer, "stitched": 1, "steps": 1}
+    out = folder / "generator"
+    options = {"out": out, "tokenizer": tokenizer, "stitched": 1, "steps": 1}
     TrainGenerator(motions=(motions,), **options).run()
-    return {"tokenizer": tokenizer, "generator": folder / "generator.safetensors"}
+    return {"tokenizer": tokenizer, "generator": out / "generator.safetensors"}
 
 
 def test_weights_say_what_they_were_trained_on(weights):

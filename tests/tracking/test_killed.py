@@ -10,10 +10,10 @@ from contextlib import suppress
 
 import pytest
 
+from loco_drake.common.run_folder import read_checkpoint
 from loco_drake.control.actor import load_actor
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import save_motion
-from loco_drake.tracking.checkpoint import load_checkpoint
 from tests.process import LIMIT, processes
 from tests.synthetic_motion import synthetic_motion
 
@@ -77,9 +77,9 @@ def workers_of(process):
 
 def check_whole(out):
     """Checkpoint and policy can be read; returns the checkpoint's steps."""
-    _, header = load_checkpoint(out / "checkpoint.safetensors")
+    saved = read_checkpoint(out / "checkpoint.safetensors", "tracker")
     load_actor(out / "policy.safetensors", get_robot("go2"))
-    return header["state"]["steps"]
+    return saved.state["steps"]
 
 
 def test_a_killed_training_goes_on_from_its_last_checkpoint(train, tmp_path):

@@ -7,13 +7,13 @@ import pytest
 import torch
 
 from loco_drake.common.errors import InputError
-from loco_drake.common.weights import save_weights
+from loco_drake.common.run_folder import read_checkpoint
+from loco_drake.common.weights import load_weights, save_weights
 from loco_drake.control.actor import load_actor
 from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.control.symmetry import mirror_actions, mirror_observations
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
-from loco_drake.tracking.checkpoint import load_checkpoint
 from loco_drake.tracking.environment_config import EnvironmentConfig
 from loco_drake.tracking.ppo import PpoConfig
 from loco_drake.tracking.randomization import STANDARD
@@ -23,6 +23,7 @@ from loco_drake.tracking.workers import WorkerVecEnv
 
 pytestmark = pytest.mark.slow
 
+CHECKPOINT = "checkpoint.safetensors"
 TROT, PACE = parse_label("dog-trot").index, parse_label("dog-pace").index
 
 
@@ -36,63 +37,68 @@ def config(steps, **ppo):
     )
 
 
+def saved_in(folder):
+    return read_checkpoint(folder / CHECKPOINT, "tracker")
+
+
 @pytest.fixture(scope="module")
 def trained(plans, tmp_path_factory):
-    """Two batches, interrupted by Ctrl-C after the second, then two more."""
+    """Two batches, then Ctrl-C in the third, then two more."""
     folder = tmp_path_factory.mktemp("tracker")
 
     def interrupt(progress):
         if progress.steps >= 128:
-            raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGINT)
 
     first = train_tracker(plans, config(256), folder, report=interrupt)
-    stopped = load_checkpoint(folder / "checkpoint.safetensors")
+    stopped = saved_in(folder)
     load_actor(folder / "policy.safetensors", get_robot("go2"))
     second = train_tracker(plans, config(256), folder, resume=True)
-    ended = load_checkpoint(folder / "checkpoint.safetensors")
+    ended = saved_in(folder)
     return folder, first, stopped, second, ended
 
 
 def test_an_interruption_leaves_a_checkpoint_and_a_policy(trained):
-    _, first, (_, header), _, _ = trained
+    _, first, stopped, _, _ = trained
     assert first["interrupted"]
-    assert first["steps"] == header["state"]["steps"] == 128
+    assert first["steps"] == stopped.state["steps"] == 128
 
 
 def test_a_resumed_training_goes_on_to_the_end(trained):
-    _, _, (before, header), second, (after, later) = trained
+    _, _, stopped, second, ended = trained
+    before, after = stopped.tensors, ended.tensors
     assert not second["interrupted"]
-    assert second["steps"] == later["state"]["steps"] == 256
+    assert second["steps"] == ended.state["steps"] == 256
     # Two epochs of two minibatches in each of four batches: Adam counts them all.
     steps = [v for k, v in after.items() if k.endswith("/step")]
     assert {float(step) for step in steps} == {16.0}
-    counts = [h["state"]["normalizer_count"] for h in (header, later)]
+    counts = [saved.state["normalizer_count"] for saved in (stopped, ended)]
     assert counts[1] - counts[0] >= 128
     changed = [
         name
         for name, value in before.items()
-        if name.startswith("policy/") and not torch.equal(value, after[name])
+        if name.startswith("module/") and not torch.equal(value, after[name])
     ]
-    assert len(changed) == sum(name.startswith("policy/") for name in before)
+    assert len(changed) == sum(name.startswith("module/") for name in before)
 
 
 def test_what_is_restored_is_what_was_saved(trained, plans, tmp_path):
     """Nothing left to do: the checkpoint that is written equals the one read."""
-    folder, _, _, _, (tensors, header) = trained
+    folder, _, _, _, ended = trained
     for name in ("checkpoint", "policy"):
         file = f"{name}.safetensors"
         (tmp_path / file).write_bytes((folder / file).read_bytes())
     train_tracker(plans, config(256), tmp_path, resume=True)
-    again, same = load_checkpoint(tmp_path / "checkpoint.safetensors")
-    assert same["state"] == header["state"]
-    assert again.keys() == tensors.keys()
-    for name, value in tensors.items():
-        assert torch.equal(value, again[name]), name
+    again = saved_in(tmp_path)
+    assert again.state == ended.state
+    assert again.tensors.keys() == ended.tensors.keys()
+    for name, value in ended.tensors.items():
+        assert torch.equal(value, again.tensors[name]), name
 
 
 def test_the_policy_is_the_learners(trained):
     """The shipped network computes what the checkpoint's weights say."""
-    folder, _, _, _, (tensors, _) = trained
+    folder, tensors = trained[0], trained[4].tensors
     actor = load_actor(folder / "policy.safetensors", get_robot("go2"))
     observation = torch.randn(
         OBSERVATION_SIZE, generator=torch.Generator().manual_seed(0)
@@ -103,9 +109,9 @@ def test_the_policy_is_the_learners(trained):
 
     def network(x):
         for layer in ("mlp_extractor.policy_net.0", "mlp_extractor.policy_net.2"):
-            W, b = (tensors[f"policy/{layer}.{part}"] for part in ("weight", "bias"))
+            W, b = (tensors[f"module/{layer}.{part}"] for part in ("weight", "bias"))
             x = torch.nn.functional.elu(W @ x + b)
-        W, b = (tensors[f"policy/action_net.{part}"] for part in ("weight", "bias"))
+        W, b = (tensors[f"module/action_net.{part}"] for part in ("weight", "bias"))
         return W @ x + b
 
     image = mirror_actions(network(mirror_observations(normal)))
@@ -131,21 +137,21 @@ def test_other_networks_cannot_be_resumed(trained, plans):
 
 def test_a_training_can_start_from_another_one(trained, plans, tmp_path):
     """Networks and normalizer are its; steps, optimizer and sampler are new."""
-    tensors, header = trained[4]
+    ended = trained[4]
     other = config(0)  # only begins
     other.environment.randomization = STANDARD
     figures = train_tracker(
         plans, other, tmp_path, first=trained[0] / "checkpoint.safetensors"
     )
     assert figures["steps"] == 0
-    begun, state = load_checkpoint(tmp_path / "checkpoint.safetensors")
-    for name, value in tensors.items():
-        if name.startswith(("policy/", "normalizer/")):
-            torch.testing.assert_close(begun[name], value, rtol=0, atol=0)
-    assert not [name for name in begun if name.startswith("optimizer/")]
-    assert (begun["sampler/scores"] == 0).all()
-    assert state["state"]["normalizer_count"] == header["state"]["normalizer_count"]
-    assert state["state"]["learning_rate"] == other.ppo.actor_rate
+    begun = saved_in(tmp_path)
+    for name, value in ended.tensors.items():
+        if name.startswith(("module/", "normalizer/")):
+            torch.testing.assert_close(begun.tensors[name], value, rtol=0, atol=0)
+    assert not [name for name in begun.tensors if name.startswith("optimizer/")]
+    assert (begun.tensors["sampler/scores"] == 0).all()
+    assert begun.state["normalizer_count"] == ended.state["normalizer_count"]
+    assert begun.state["learning_rate"] == other.ppo.actor_rate
 
 
 def test_an_unprivileged_policy_can_start_from_a_privileged_one(
@@ -154,13 +160,13 @@ def test_an_unprivileged_policy_can_start_from_a_privileged_one(
     """One batch on: counted from there, by Adam too; it must be resumed as it is."""
     other = config(64, privileged=False)
     train_tracker(plans, other, tmp_path, first=trained[0] / "checkpoint.safetensors")
-    tensors, header = load_checkpoint(tmp_path / "checkpoint.safetensors")
-    assert header["state"]["steps"] == 64
-    steps = [v for k, v in tensors.items() if k.endswith("/step")]
+    begun = saved_in(tmp_path)
+    assert begun.state["steps"] == 64
+    steps = [v for k, v in begun.tensors.items() if k.endswith("/step")]
     assert {float(step) for step in steps} == {4.0}
     actor = load_actor(tmp_path / "policy.safetensors", get_robot("go2"))
     assert not actor.config.privileged
-    with pytest.raises(InputError, match="'privileged': False"):
+    with pytest.raises(InputError, match="has --privileged False, not True;"):
         train_tracker(plans, config(128), tmp_path, resume=True)
 
 
@@ -170,10 +176,10 @@ def test_other_networks_and_observations_cannot_be_started_from(
     checkpoint, out = trained[0] / "checkpoint.safetensors", tmp_path / "out"
     wide = config(64)
     wide.ppo.hidden = [8, 8]
-    with pytest.raises(InputError, match=r"'hidden': \[16, 16\]"):
+    with pytest.raises(InputError, match=r"--hidden \[16, 16\], not \[8, 8\]"):
         train_tracker(plans, wide, out, first=checkpoint)
-    tensors, header = load_checkpoint(checkpoint)
-    header["config"]["observation_layout"][0][0] = "gravity_W"
+    tensors, header = load_weights(checkpoint, "tracker checkpoint")
+    header["run"]["observation_layout"][0][0] = "gravity_W"
     other = tmp_path / "other.safetensors"
     save_weights(other, "tracker checkpoint", tensors, header)
     with pytest.raises(InputError, match="another observation layout"):
@@ -183,8 +189,35 @@ def test_other_networks_and_observations_cannot_be_started_from(
     assert not out.exists()
 
 
+def test_checkpoints_of_before_can_be_gone_on_with(trained, plans, tmp_path):
+    """As they were written once: "policy", "config", homing, NaN for no score."""
+    tensors, header = load_weights(trained[0] / CHECKPOINT, "tracker checkpoint")
+    old = {name.replace("module/", "policy/"): x for name, x in tensors.items()}
+    old["sampler/plan_scores"] = torch.where(
+        old["sampler/plan_scores"] < 0, torch.nan, old["sampler/plan_scores"]
+    )
+    options = dict(header["options"])
+    options["environment"]["homing"] = options["environment"].pop("position_penalty")
+    config_of_before = {
+        "fixed": {"robot": "go2", "hidden": [16, 16], "privileged": True},
+        "observation_layout": header["run"]["observation_layout"],
+        "training": options,
+    }
+    path = tmp_path / CHECKPOINT
+    header = {"state": header["state"], "config": config_of_before}
+    save_weights(path, "tracker checkpoint", old, header)
+    figures = train_tracker(plans, config(320), tmp_path, resume=True)
+    assert figures["steps"] == 320
+    again = saved_in(tmp_path)
+    before = saved_in(trained[0])
+    assert again.run == before.run
+    assert not torch.equal(
+        again.tensors["module/log_std"], before.tensors["module/log_std"]
+    )
+
+
 def test_nothing_cannot_be_resumed(plans, tmp_path):
-    with pytest.raises(InputError, match="no tracker checkpoint weights"):
+    with pytest.raises(InputError, match="There is no run to resume"):
         train_tracker(plans, config(64), tmp_path / "none", resume=True)
     assert not (tmp_path / "none").exists()
 
@@ -204,11 +237,11 @@ def test_a_killed_worker_is_reported(plans):
         workers.close()
 
 
-def test_homing_is_no_part_of_returns(plans):
+def test_the_position_penalty_is_no_part_of_returns(plans):
     """The same steps are rewarded less, and score the same."""
     rewards, returns = [], []
-    for homing in (0.0, 1.0):
-        environment = EnvironmentConfig(homing=homing, episode_steps=5)
+    for penalty in (0.0, 1.0):
+        environment = EnvironmentConfig(position_penalty=penalty, episode_steps=5)
         workers = WorkerVecEnv(
             plans, environment, PlanSampler(plans, 0), workers=1, per_worker=1, seed=0
         )

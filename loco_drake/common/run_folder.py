@@ -1,0 +1,328 @@
+"""The folder of a training: one at a time, never overwritten, resumed as it was."""
+
+import fcntl
+import os
+import signal
+import threading
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from pathlib import Path
+from types import FrameType
+from typing import Any, TypeVar
+
+import torch
+from torch import Tensor, nn
+
+from loco_drake.common.errors import InputError
+from loco_drake.common.weights import load_into, load_weights, save_weights
+
+CHECKPOINT = "checkpoint.safetensors"
+
+# What the sampler of a tracker knows of plans: nothing of those not drawn yet.
+_MAY_BE_NAN = ("sampler/plan_scores", "sampler/plan_shares")
+
+Config = TypeVar("Config")
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """What a checkpoint holds.
+
+    Attributes:
+        path: of the file.
+        tensors: networks, optimizer, random states.
+        state: everything else that training goes on from; "steps" are those done.
+        run: what the training depends on, by the name of the option.
+        options: with which the command was called, as nested JSON.
+    """
+
+    path: Path
+    tensors: dict[str, Tensor]
+    state: dict[str, Any]
+    run: dict[str, Any]
+    options: dict[str, Any]
+
+
+def read_checkpoint(path: Path, name: str) -> Checkpoint:
+    """Reads a checkpoint.
+
+    Args:
+        path: of the file.
+        name: of the training: "tracker", "tokenizer", ...
+
+    Raises:
+        InputError: if the file is missing, damaged, or of another training.
+    """
+    tensors, header = load_weights(path, f"{name} checkpoint", _MAY_BE_NAN)
+    if "config" in header:  # as trackers were saved before there were options
+        options = header["config"]["training"]
+        options["environment"]["position_penalty"] = options["environment"].pop(
+            "homing", 0.0
+        )
+        run = settings(options, "steps")
+        run["observation_layout"] = header["config"].get("observation_layout")
+        header = {"state": header["state"], "run": run, "options": options}
+    with sound(path):
+        return Checkpoint(
+            path,
+            tensors,
+            {**header["state"], "steps": int(header["state"]["steps"])},
+            dict(header["run"]),
+            dict(header["options"]),
+        )
+
+
+class RunFolder:
+    """A folder that one training holds.
+
+    Attributes:
+        saved: the checkpoint to go on from, None at the start.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        name: str,
+        run: Mapping[str, Any],
+        options: Mapping[str, Any],
+        saved: Checkpoint | None,
+    ) -> None:
+        self.saved = saved
+        self._path = folder / CHECKPOINT
+        self._name = name
+        self._header = {"run": dict(run), "options": dict(options)}
+
+    def save(self, tensors: dict[str, Tensor], state: dict[str, Any]) -> None:
+        """Replaces the checkpoint; see :class:`Checkpoint`."""
+        header = {**self._header, "state": state}
+        save_weights(self._path, f"{self._name} checkpoint", tensors, header)
+
+
+@contextmanager
+def open_run(
+    folder: Path,
+    name: str,
+    weights: str,
+    run: Mapping[str, Any],
+    *,
+    steps: int,
+    resume: bool,
+    options: Mapping[str, Any],
+) -> Iterator[RunFolder]:
+    """Holds a folder for one training, which other processes are then kept out of.
+
+    Args:
+        folder: made if there is none.
+        name: of the training: "tracker", "tokenizer", ...
+        weights: name of the file that the training ends with, or writes on the way.
+        run: what the training depends on, by the name of the option, as JSON.
+        steps: to do in all.
+        resume: go on from the checkpoint in the folder.
+        options: see :class:`Checkpoint`.
+
+    Raises:
+        InputError: if another process trains there; if there is a run and ``resume`` is
+            not set; if it is and there is none, it is damaged, or it was of something
+            else than ``run``.
+    """
+    check_folder(folder, weights, resume)
+    folder.mkdir(parents=True, exist_ok=True)
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            # The system lets go of it when the process ends, however it does.
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(
+                f"Another training is at work in {str(folder)!r}; stop it first, or "
+                "name another folder with --out."
+            ) from None
+        check_folder(folder, weights, resume)
+        saved = read_checkpoint(folder / CHECKPOINT, name) if resume else None
+        if saved is not None:
+            check_same(saved, run, settings(options), steps)
+        for unfinished in folder.glob(".*.safetensors"):
+            unfinished.unlink()  # what a training was writing when it was killed
+        yield RunFolder(folder, name, run, options, saved)
+    finally:
+        os.close(handle)
+
+
+def check_folder(folder: Path, weights: str, resume: bool) -> None:
+    """Raises InputError if a training cannot begin, or go on, in ``folder``."""
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--out must be a folder, and {str(folder)!r} is none.")
+    found = [file for file in (CHECKPOINT, weights) if (folder / file).exists()]
+    if resume and CHECKPOINT not in found:
+        raise InputError(
+            f"There is no run to resume in {str(folder)!r}, which has no {CHECKPOINT}; "
+            "to begin one, leave out --resume."
+        )
+    if found and not resume:
+        raise InputError(
+            f"{str(folder)!r} holds a run already ({', '.join(found)}); go on with it "
+            "with --resume, or name another folder with --out."
+        )
+
+
+def check_same(
+    saved: Checkpoint, run: Mapping[str, Any], options: Iterable[str], steps: int
+) -> None:
+    """Raises InputError unless a checkpoint is of ``run``.
+
+    Args:
+        saved: the checkpoint.
+        run: see :func:`open_run`; what the checkpoint does not know is not compared.
+        options: which of its names are those of options.
+        steps: to do in all.
+    """
+    folder = str(saved.path.parent)
+    differ = [name for name in run if saved.run.get(name, run[name]) != run[name]]
+    if differ:
+        # What follows from an option need not be named beside it.
+        named = {x: f"--{x.replace('_', '-')}" for x in differ if x in options}
+        names = named or {name: name for name in differ}
+        values = [f"{y} {saved.run[x]}, not {run[x]}" for x, y in names.items()]
+        raise InputError(
+            f"The run in {folder!r} has {', and '.join(values)}; resume it as it is, "
+            "or train anew in another folder with --out."
+        )
+    if steps < saved.state["steps"]:
+        raise InputError(
+            f"The run in {folder!r} has done {saved.state['steps']} steps, more than "
+            f"--steps {steps}."
+        )
+
+
+def settings(options: Mapping[str, Any], *without: str) -> dict[str, Any]:
+    """Returns nested options under the names that the command line gives them.
+
+    The parts "environment" and "ppo" have no names there.
+    """
+    flat: dict[str, Any] = {}
+    for name, value in options.items():
+        if isinstance(value, Mapping):
+            prefix = "" if name in ("environment", "ppo") else f"{name}."
+            flat |= {f"{prefix}{key}": inner for key, inner in settings(value).items()}
+        elif name not in without:
+            flat[name] = list(value) if isinstance(value, tuple) else value
+    return flat
+
+
+def options_of(config: Any) -> dict[str, Any]:
+    """Returns a dataclass as nested JSON."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: plain(inner) for key, inner in value.items()}
+        if isinstance(value, list | tuple):
+            return [plain(inner) for inner in value]
+        return str(value) if isinstance(value, Path) else value
+
+    converted: dict[str, Any] = plain(asdict(config))
+    return converted
+
+
+def with_options(config: Config, options: Mapping[str, Any]) -> Config:
+    """Returns a copy of a dataclass with values of :func:`options_of`.
+
+    What ``options`` lacks stays; what the dataclass lacks is left out.
+    """
+    changes = {}
+    for field in fields(config):  # type: ignore[arg-type]
+        if field.name in options:
+            old, new = getattr(config, field.name), options[field.name]
+            if is_dataclass(old):
+                new = with_options(old, new)
+            elif isinstance(new, list) and not isinstance(old, list):
+                new = tuple(Path(x) if "Path" in str(field.type) else x for x in new)
+            elif isinstance(new, str) and "Path" in str(field.type):
+                new = Path(new)
+            changes[field.name] = new
+    return replace(config, **changes)  # type: ignore[type-var]
+
+
+def learning_tensors(
+    module: nn.Module, optimizer: torch.optim.Optimizer
+) -> dict[str, Tensor]:
+    """Returns networks, optimizer and torch's random state for a checkpoint."""
+    tensors = {f"module/{name}": value for name, value in module.state_dict().items()}
+    for index, moments in optimizer.state_dict()["state"].items():
+        tensors |= {f"optimizer/{index}/{name}": x for name, x in moments.items()}
+    return {**tensors, "random/torch": torch.get_rng_state()}
+
+
+def restore_learning(
+    saved: Checkpoint, module: nn.Module, optimizer: torch.optim.Optimizer
+) -> None:
+    """Puts back what :func:`learning_tensors` returned.
+
+    Raises:
+        InputError: if the tensors do not fit.
+    """
+    load_module(saved, module)
+    with sound(saved.path):
+        moments: dict[int, dict[str, Tensor]] = {}
+        for key, value in part(saved, "optimizer").items():
+            index, name = key.split("/")
+            moments.setdefault(int(index), {})[name] = value
+        groups = optimizer.state_dict()["param_groups"]
+        optimizer.load_state_dict({"state": moments, "param_groups": groups})
+        torch.set_rng_state(saved.tensors["random/torch"])
+
+
+def load_module(saved: Checkpoint, module: nn.Module) -> None:
+    """Gives ``module`` the networks of a checkpoint.
+
+    Raises:
+        InputError: if they do not fit.
+    """
+    # Trackers of before called it "policy".
+    tensors = part(saved, "module") or part(saved, "policy")
+    load_into(module, tensors, saved.path)
+
+
+def part(saved: Checkpoint, name: str) -> dict[str, Tensor]:
+    """Returns the tensors of a checkpoint whose names begin with ``name/``."""
+    prefix = f"{name}/"
+    return {
+        key.removeprefix(prefix): value
+        for key, value in saved.tensors.items()
+        if key.startswith(prefix)
+    }
+
+
+@contextmanager
+def sound(path: Path) -> Iterator[None]:
+    """Within it, what cannot be used of a checkpoint is an InputError."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (AttributeError, LookupError, TypeError, ValueError, RuntimeError):
+        raise InputError(
+            f"{path} is damaged, or does not fit the network that it is of."
+        ) from None
+
+
+@contextmanager
+def stop_requests() -> Iterator[threading.Event]:
+    """Yields an event that Ctrl-C and SIGTERM set; a second one interrupts."""
+    requested = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield requested  # only the main thread may handle signals
+        return
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        if requested.is_set():
+            raise KeyboardInterrupt
+        requested.set()
+
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    previous = [signal.signal(number, handle) for number in numbers]
+    try:
+        yield requested
+    finally:
+        for number, handler in zip(numbers, previous, strict=True):
+            signal.signal(number, handler)
