@@ -10,7 +10,6 @@ learned is written to a folder, and can be watched:
 
 from pathlib import Path
 
-import torch
 import tyro
 
 from loco_drake.control.plan import plan_from_motion
@@ -54,7 +53,6 @@ def train(
     plans = [smooth_plan(robot, plan_from_motion(robot, m), limits) for m in motions]
     print(f"{len(plans)} references of {seconds:g} s")
 
-    torch.set_num_threads(workers)
     config = TrainingConfig(
         steps=steps,
         workers=workers,

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from loco_drake import __version__
+from loco_drake.common.determinism import use_one_thread
 from loco_drake.common.errors import InputError, check_choice
 
 # Command: module, class, what it does. A module is imported only when its command is
@@ -84,6 +85,7 @@ def main(arguments: list[str] | None = None) -> int:
             return 0
         name, rest = _split(arguments, members)
         module, class_name, _ = _COMMANDS[name]
+        use_one_thread()
         command = getattr(import_module(f"loco_drake.cli.{module}"), class_name)
         # A filter, for importing Drake sets the level anew.
         logging.getLogger("drake").addFilter(_is_error)

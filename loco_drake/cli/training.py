@@ -6,6 +6,8 @@ from typing import Any
 import tyro
 from rich.console import Console
 
+from loco_drake.common.errors import InputError
+
 # Options that are not the run's: where it is, and what a call does.
 _OF_THE_CALL = ("out", "resume", "json", "start_from")
 # Where it learned from may be elsewhere now: what is there is compared.
@@ -34,6 +36,8 @@ def parse_resumed(command: Any, prog: str, args: Sequence[str]) -> Any:
         with_options,
     )
 
+    if getattr(command, "start_from", None) is not None:
+        raise InputError("Give either --start-from or --resume, not both.")
     check_folder(command.out, CHECKPOINT, resume=True)
     saved = read_checkpoint(command.out / CHECKPOINT, command.NAME)
     own = {k: v for k, v in saved.options.items() if k not in _OF_THE_CALL}

@@ -7,6 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
+from loco_drake.common.determinism import use_one_thread
 from loco_drake.common.errors import check_at_least
 
 Item = TypeVar("Item")
@@ -68,6 +69,7 @@ def _map(
 def _start(make: Callable[[], Callable[[Any], Any]]) -> None:
     # Ctrl-C reaches the whole group of processes; the main one decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    use_one_thread()
     global _function
     _function = make()
 

@@ -249,7 +249,10 @@ def _restore(learner: AdaptivePPO, sampler: PlanSampler, saved: Checkpoint) -> N
     with sound(saved.path):
         for name in _SCORES:
             scores = saved.tensors[f"sampler/{name}"].numpy()
-            getattr(sampler, name)[:] = np.where(scores < 0, np.nan, scores)
+            own = getattr(sampler, name)
+            # Checkpoints of before know fewer labels, and may be of other plans.
+            if not name.startswith("plan") or len(own) == len(scores):
+                own[: len(scores)] = np.where(scores < 0, np.nan, scores)
         sampler.random.bit_generator.state = saved.state["sampler_random"]
         position, has_gauss, gauss = saved.state["numpy_random"]
         keys = saved.tensors["random/numpy"].numpy().astype(np.uint32)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
+from loco_drake.common.determinism import use_one_thread
 from loco_drake.control.plan import Plan
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
@@ -36,6 +37,7 @@ def _work(
     """Serves one message after the other: actions and the plans to go on with."""
     # Ctrl-C reaches the whole group; the trainer decides what becomes of it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    use_one_thread()
     batch = TrackingBatch(plans, config, len(seeds))
     random = [np.random.default_rng(seed) for seed in seeds]
     # What there is now stays: the garbage collector need not look through it each time.
