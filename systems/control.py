@@ -6,6 +6,7 @@ import torch
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
+from loco_drake.common.determinism import single_thread
 from loco_drake.control.action import joint_targets, set_points
 from loco_drake.control.actor import Actor
 from loco_drake.control.observation import OBSERVATION_SIZE, observe, preview
@@ -169,7 +170,8 @@ class TrackingPolicy(LeafSystem):
 
     def _calc(self, context: Context, output: Any) -> None:
         observation = torch.from_numpy(self._observation.Eval(context)).float()
-        with torch.inference_mode():
+        # In a user's process, too: torch's second thread would wait for a busy core.
+        with torch.inference_mode(), single_thread():
             output.set_value(self._actor(observation).double().numpy())
 
 

@@ -49,6 +49,25 @@ def test_the_system_computes_the_network(actor):
     np.testing.assert_allclose(action, expected, atol=1e-5)
 
 
+def test_the_network_runs_on_one_thread_and_gives_the_others_back(actor):
+    """In the process of a user who set torch to two."""
+    seen = []
+    actor.layers.register_forward_pre_hook(
+        lambda *_: seen.append(torch.get_num_threads())
+    )
+    policy = TrackingPolicy(actor)
+    context = policy.CreateDefaultContext()
+    policy.GetInputPort("observation").FixValue(context, np.ones(OBSERVATION_SIZE))
+    threads = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        policy.GetOutputPort("action").Eval(context)
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(threads)
+    assert seen == [1, 1]  # the observation and its mirror image
+
+
 def test_hidden_parts_are_at_their_mean(actor):
     """Actions are those of a privileged actor that sees the mean there.
 
