@@ -13,6 +13,8 @@ from loco_drake.common.run_folder import open_run, read_checkpoint
 from loco_drake.motion.motion_file import save_motion
 from tests.synthetic_motion import synthetic_motion
 
+pytestmark = pytest.mark.slow
+
 KINDS = ("tokenizer", "generator", "tracker", "classifier")
 CHECKPOINT = "checkpoint.safetensors"
 # An option of each that the run has otherwise, and what is said of it.

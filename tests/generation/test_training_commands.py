@@ -36,7 +36,7 @@ def test_from_motions_to_new_motions_by_three_commands(motions, tmp_path):
     )
     assert learn.run() == 0
     assert json.loads((tmp_path / "generator.json").read_text())["steps"] == 2
-    learn.books = 13
+    learn.books, learn.out = 13, tmp_path / "another"
     with pytest.raises(InputError, match="--books must be from 1 to 12"):
         learn.run()
     generate = Generate(
