@@ -212,9 +212,7 @@ def _tensors(learner: AdaptivePPO, sampler: PlanSampler) -> dict[str, Tensor]:
     tensors["normalizer/mean"] = torch.from_numpy(statistics.mean)
     tensors["normalizer/variance"] = torch.from_numpy(statistics.var)
     for name in _SCORES:
-        # Plans that have not been drawn yet have none: NaN, which no file may hold.
-        scores = np.nan_to_num(getattr(sampler, name), nan=-1.0)
-        tensors[f"sampler/{name}"] = torch.from_numpy(scores)
+        tensors[f"sampler/{name}"] = torch.from_numpy(getattr(sampler, name))
     # stable-baselines3 shuffles its minibatches with numpy's global generator.
     _, keys, *_ = np.random.get_state()  # noqa: NPY002
     tensors["random/numpy"] = torch.from_numpy(np.asarray(keys).astype(np.int64))
@@ -252,7 +250,7 @@ def _restore(learner: AdaptivePPO, sampler: PlanSampler, saved: Checkpoint) -> N
             own = getattr(sampler, name)
             # Checkpoints of before know fewer labels, and may be of other plans.
             if not name.startswith("plan") or len(own) == len(scores):
-                own[: len(scores)] = np.where(scores < 0, np.nan, scores)
+                own[: len(scores)] = scores
         sampler.random.bit_generator.state = saved.state["sampler_random"]
         position, has_gauss, gauss = saved.state["numpy_random"]
         keys = saved.tensors["random/numpy"].numpy().astype(np.uint32)
