@@ -177,6 +177,11 @@ def _make(file: RobotFile, path: Path) -> ChainRobot:
                 f"In the stance {joint} at {angle:g} rad is not within {low:g} to "
                 f"{high:g}."
             )
+    for joint, limit in zip(joint_names, speed, strict=True):
+        if limit == 0:
+            raise InputError(
+                f"The URDF lets joint {joint} move at 0 rad/s; give its leg's speed."
+            )
     robot = ChainRobot(
         name=name,
         definition=str(path.resolve()),

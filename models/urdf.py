@@ -1,5 +1,6 @@
 """The legs of any robot's URDF, as chains of joints."""
 
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +28,7 @@ _FOOT_SHARE = 0.1
 # What is left of a URDF: what moves, and how. So it needs no inertias and no meshes.
 _KEPT = {
     "robot": {"link", "joint", "frame"},
-    "joint": {"parent", "child", "origin", "axis", "limit"},
+    "joint": {"parent", "child", "origin", "axis"},
 }
 
 # Drake welds a link of this name to the world; many files begin with one that a joint
@@ -104,25 +105,25 @@ def read_legs(
     """
     names = [name for leg in joints for name in leg]
     root = _read_xml(path)
-    types = {str(j.get("name")): j.get("type") for j in root.iterfind("joint")}
-    for name in names:
-        kind = types[check_choice("joint", name, types)]
-        if kind not in ("revolute", "continuous"):
-            raise InputError(f"Joint {name} is {kind}; only revolute ones make a leg.")
+    elements = {str(joint.get("name")): joint for joint in root.iterfind("joint")}
+    limits = [
+        _read_limits(elements[check_choice("joint", name, elements)]) for name in names
+    ]
     _check_independent(root, feet)
     model = _strip(root, names)
     plant = MultibodyPlant(time_step=0.0)
     try:
         Parser(plant).AddModelsFromString(model, "urdf")
+        plant.Finalize()
     except (RuntimeError, ValueError) as error:
-        reason = " ".join(str(error).split())[:300]
+        reason = re.sub(r"<literal-string>\S* error: ", "", str(error))
+        reason = " ".join(reason.split())[:300]
         raise InputError(f"Drake cannot read {path.name}: {reason}") from None
     # Drake adds frames of its own, which nobody means.
     frames = [str(tag.get("name")) for tag in root if tag.tag in ("link", "frame")]
     check_choice("trunk", trunk, frames)
     for foot in feet:
         check_choice("foot", foot, frames)
-    plant.Finalize()
     moving: list[RevoluteJoint] = [plant.GetJointByName(name) for name in names]
     for leg, foot, own in zip(LEGS, feet, joints, strict=True):
         _check_path(plant, leg, foot, own, names)
@@ -148,9 +149,9 @@ def read_legs(
         axes=np.reshape(axes, (4, -1, 3)),
         origins=np.reshape(origins, (4, -1, 3)),
         toes=np.array(toes),
-        lower=np.array([joint.position_lower_limits()[0] for joint in moving]),
-        upper=np.array([joint.position_upper_limits()[0] for joint in moving]),
-        speed=np.array([joint.velocity_upper_limits()[0] for joint in moving]),
+        lower=np.array([low for low, _, _ in limits]),
+        upper=np.array([high for _, high, _ in limits]),
+        speed=np.array([speed for _, _, speed in limits]),
     )
 
 
@@ -174,6 +175,37 @@ def _read_xml(path: Path) -> ET.Element:
             f"'xacro {path.name} > {path.name.split('.')[0]}.urdf'."
         )
     return root
+
+
+def _read_limits(joint: ET.Element) -> tuple[float, float, float]:
+    """Returns lower, upper and speed limit of a revolute joint; infinite by default.
+
+    Drake would stop the process for limits that contradict each other.
+    """
+    name, kind = joint.get("name"), joint.get("type")
+    if kind not in ("revolute", "continuous"):
+        raise InputError(f"Joint {name} is {kind}; only revolute ones make a leg.")
+    element = joint.find("limit")
+    values = {} if element is None else element.attrib
+    try:
+        lower, upper, speed = (
+            float(values.get(key, default))
+            for key, default in (
+                ("lower", "-inf"),
+                ("upper", "inf"),
+                ("velocity", "inf"),
+            )
+        )
+    except ValueError:
+        raise InputError(f"The limits of joint {name} are no numbers.") from None
+    if kind == "continuous":
+        lower, upper = -np.inf, np.inf
+    if not (lower <= upper and speed >= 0):
+        raise InputError(
+            f"The limits of joint {name} contradict each other: lower {lower:g}, upper "
+            f"{upper:g} rad, velocity {speed:g} rad/s."
+        )
+    return lower, upper, speed
 
 
 def _check_independent(root: ET.Element, feet: Sequence[str]) -> None:

@@ -40,6 +40,8 @@ def read_yaml(path: Path, schema: type[T], what: str) -> T:
         result: T = _convert(data, schema, "it")
     except RecursionError:
         raise InputError(f"{path} is not {what}: it is nested too deeply.") from None
+    except AttributeError:  # Drake asks keys how they begin
+        raise InputError(f"{path} is not {what}: every key must be text.") from None
     except Exception as error:  # Drake and PyYAML raise many kinds
         reason = " ".join(str(error).split()).removesuffix(".")
         if len(reason) > _MAX_REASON and not isinstance(error, InputError):
