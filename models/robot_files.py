@@ -120,6 +120,12 @@ def _check(file: RobotFile) -> None:
         raise InputError(
             f"legs must be {', '.join(LEGS)}, not {', '.join(sorted(file.legs))}."
         )
+    joints = [joint for leg in file.legs.values() for joint in leg.joints]
+    twice = sorted({joint for joint in joints if joints.count(joint) > 1})
+    if twice:
+        raise InputError(
+            f"Each joint belongs to one leg, but {twice[0]} is named twice."
+        )
     count = len(file.legs[LEGS[0]].joints)
     for name, leg in file.legs.items():
         missing = [key for key in ("joints", "foot", "stand") if not getattr(leg, key)]

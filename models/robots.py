@@ -1,18 +1,18 @@
 """The robots: what their models say, as numbers."""
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common.yaml import yaml_load_typed
+from pydrake.common.yaml import yaml_load
 from pydrake.geometry import SceneGraph, Sphere
-from pydrake.multibody.parsing import PackageMap, Parser
+from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder
 
 from loco_drake.common.errors import check_choice
 
@@ -169,31 +169,17 @@ class Robot(Quadruped):
         return p_B
 
 
-# Not frozen: yaml_load_typed sets the fields one by one.
-@dataclass(kw_only=True)
-class RobotExtras:
-    """What a robot's YAML file adds to its URDF."""
-
-    # Joints of the usual stance in rad, shape (12,), legs FL, FR, RL, RR.
-    stand_joints: list[float] = field(default_factory=list)
-
-
-def AddModelPackages(package_map: PackageMap, *, visual: bool = True) -> None:
-    """Registers the packages that the models' URLs name.
+def ConfigureParser(parser: Parser, *, visual: bool = True) -> None:
+    """Makes known to ``parser`` the packages that the models' URLs name.
 
     Args:
-        package_map: of the parser or scenario that is to load the models.
+        parser: that is to load the models.
         visual: whether to register the meshes too; the first time that takes some
             seconds, see :mod:`loco_drake.models.meshes`.
     """
-    package_map.AddPackageXml(str(_MODELS / "package.xml"))
+    parser.package_map().AddPackageXml(str(_MODELS / "package.xml"))
     if visual:
-        AddMeshPackage(package_map)
-
-
-def ConfigureParser(parser: Parser, *, visual: bool = True) -> None:
-    """Makes the robots' models known to ``parser``; see :func:`AddModelPackages`."""
-    AddModelPackages(parser.package_map(), visual=visual)
+        AddMeshPackage(parser.package_map())
 
 
 def AddRobotModel(parser: Parser, name: str, *, visual: bool) -> ModelInstanceIndex:
@@ -231,10 +217,8 @@ def get_robot(name: str) -> Robot:
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.01)
     AddRobotModel(Parser(plant), name, visual=False)
     plant.Finalize()
-    extras = yaml_load_typed(
-        schema=RobotExtras, filename=str(_MODELS / name / f"{name}.yaml")
-    )
-
+    # What the URDF does not say: the usual stance, in rad, legs FL, FR, RL, RR.
+    extras = yaml_load(filename=str(_MODELS / name / f"{name}.yaml"))
     names = tuple(f"{leg}_{part}_joint" for leg in LEGS for part in LEG_JOINTS)
     joints = [plant.GetJointByName(joint) for joint in names]
     actuators = [plant.GetJointActuatorByName(j.removesuffix("_joint")) for j in names]
@@ -243,16 +227,14 @@ def get_robot(name: str) -> Robot:
     # Lengths are those between frames of the model with all joints at zero.
     context = plant.CreateDefaultContext()
     plant.SetPositions(context, [1.0, *[0.0] * (plant.num_positions() - 1)])
-    p_BHip = _origins(plant, context, [f"{leg}_hip" for leg in LEGS])
-    p_BThigh = _origins(plant, context, [f"{leg}_thigh" for leg in LEGS])
-    p_BCalf = _origins(plant, context, [f"{leg}_calf" for leg in LEGS])
-    p_BF = _origins(plant, context, [f"{leg}_foot" for leg in LEGS])
+    p_BHip, p_BThigh, p_BCalf, p_BF = (
+        _origins(plant, context, part) for part in (*LEG_JOINTS, "foot")
+    )
     foot_radius = _foot_radius(plant, scene_graph)
 
-    stand_joints = np.array(extras.stand_joints)
+    stand_joints = np.array(extras["stand_joints"], dtype=np.float64)
     plant.SetPositions(context, [1.0, *[0.0] * 6, *stand_joints])
-    lowest = _origins(plant, context, [f"{leg}_foot" for leg in LEGS])[:, 2].min()
-
+    lowest = _origins(plant, context, "foot")[:, 2].min()
     joint_inertia = np.diag(plant.CalcMassMatrix(context))[6:]
 
     return Robot(
@@ -289,15 +271,11 @@ def _url(name: str) -> str:
     return f"package://loco_drake_models/{name}/{name}.urdf"
 
 
-def _origins(plant: MultibodyPlant, context: object, frames: list[str]) -> Array:
-    """Returns the origins of ``frames`` in B, shape (len(frames), 3)."""
+def _origins(plant: MultibodyPlant, context: Context, part: str) -> Array:
+    """Returns the origins of the four legs' frames of that name in B, shape (4, 3)."""
     base = plant.GetFrameByName("base")
-    return np.array(
-        [
-            plant.GetFrameByName(frame).CalcPose(context, base).translation()
-            for frame in frames
-        ]
-    )
+    frames = [plant.GetFrameByName(f"{leg}_{part}") for leg in LEGS]
+    return np.array([frame.CalcPose(context, base).translation() for frame in frames])
 
 
 def _foot_radius(plant: MultibodyPlant, scene_graph: SceneGraph) -> float:

@@ -3,8 +3,8 @@
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +36,7 @@ _KEPT = {
 _WORLD, _NOT_WORLD = "world", "world_link"
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class UrdfLegs:
+class UrdfLegs(NamedTuple):
     """Four legs of n joints each, their frames where all joints are at zero.
 
     Attributes:

@@ -105,6 +105,8 @@ FL = "joints: [FL_HFE, FL_KFE]"
             (FL, "joints: [FL_KFE, FL_HFE]"),
             "moved by the joints FL_HFE, FL_KFE, in this",
         ),
+        ((FL, "joints: [FL_KFE, FL_KFE]"), "one leg, but FL_KFE is named twice"),
+        ((FL, "joints: [FL_HFE, FR_KFE]"), "one leg, but FR_KFE is named twice"),
         (("foot: FL_FOOT", "foot: FR_FOOT"), "Foot FR_FOOT of leg FL is moved by the"),
         ((FL, "joints: [FL_HFE, FL_ANKLE]"), "Joint FL_ANKLE is fixed; only revolute"),
         (("lower: [-2.0, -2.8]", "lower: [-2.0]"), "lower of leg FL must be 2 numbers"),
