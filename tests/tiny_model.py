@@ -15,7 +15,12 @@ def make_tiny_model(robots: tuple[str, ...] = ("go2",)) -> MotionModel:
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(3)
         config = TokenizerConfig(
-            robots=robots, width=16, depth=2, frame_width=8, books=2, book_size=16
+            robots=robots,
+            width=16,
+            depth=2,
+            frame_width=8,
+            codebooks=2,
+            codebook_size=16,
         )
         tokenizer = Tokenizer(config)
         learning = LearningTokenizer(tokenizer)
@@ -30,8 +35,8 @@ def make_tiny_model(robots: tuple[str, ...] = ("go2",)) -> MotionModel:
         generator = Generator(
             GeneratorConfig(
                 tokenizer=tokenizer.fingerprint,
-                books=2,
-                book_size=16,
+                codebooks=2,
+                codebook_size=16,
                 frames_per_token=4,
                 labels=("dog-pace", "dog-trot"),
                 window=6,

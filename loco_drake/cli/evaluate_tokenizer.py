@@ -39,7 +39,7 @@ class EvaluateTokenizer(Evaluation):
         self._folder = data_dir(self.data_dir)
         self._path = self.tokenizer or pretrained_path("tokenizer")
         self._tokenizer = load_tokenizer(self._path)
-        books = self._tokenizer.config.books
+        books = self._tokenizer.config.codebooks
         if self.books is not None and not 1 <= self.books <= books:
             raise InputError(
                 f"--books must be from 1 to {books}, as many as the tokenizer has, "

@@ -52,8 +52,8 @@ class Generate:
         """
         from loco_drake.generation.generate import (
             check_duration,
-            check_pace,
             check_sampling,
+            check_speed_rank,
             generate_motions,
         )
         from loco_drake.generation.motion_model import load_motion_model
@@ -64,7 +64,7 @@ class Generate:
         check_duration(self.duration)
         schedule.check_ends_by(self.duration)
         check_sampling(self.temperature, self.top_p)
-        check_pace(self.pace)
+        check_speed_rank(self.pace)
         check_choice("robot", self.robot, ROBOTS)
         check_at_least("count", self.count, 1)
         check_at_least("seed", self.seed, 0)
@@ -84,7 +84,7 @@ class Generate:
                 seeds,
                 temperature=self.temperature,
                 top_p=self.top_p,
-                pace=self.pace,
+                speed_rank=self.pace,
             )
             seconds += time.perf_counter() - start
             for seed, motion in zip(seeds, motions, strict=True):

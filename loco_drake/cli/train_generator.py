@@ -59,15 +59,16 @@ class TrainGenerator(LoopSettings):
         check_folder(self.out, f"{self.NAME}.safetensors", self.resume)
         library = load_library(*self.motions)
         tokenizer = load_tokenizer(self.tokenizer)
-        if not 1 <= self.books <= tokenizer.config.books:
+        most = tokenizer.config.codebooks
+        if not 1 <= self.books <= most:
             raise InputError(
-                f"--books must be from 1 to {tokenizer.config.books}, as many as the "
-                f"tokenizer has, not {self.books}."
+                f"--books must be from 1 to {most}, as many as the tokenizer has, not "
+                f"{self.books}."
             )
         config = GeneratorConfig(
             tokenizer=tokenizer.fingerprint,
-            books=self.books,
-            book_size=tokenizer.config.book_size,
+            codebooks=self.books,
+            codebook_size=tokenizer.config.codebook_size,
             frames_per_token=tokenizer.config.frames_per_token,
             labels=tuple(str(label) for label in library.labels),
         )

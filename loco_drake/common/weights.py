@@ -143,7 +143,9 @@ def read_config(config_class: type[Config], values: Any, path: Path) -> Config:
         InputError: if a field is unknown, missing, of another type, or no size.
     """
     hints = get_type_hints(config_class)
+    before = getattr(config_class, "BEFORE", {})  # what fields were called once
     values = values if isinstance(values, dict) else {}
+    values = {before.get(name, name): value for name, value in values.items()}
     needed = [
         field.name
         for field in fields(config_class)  # type: ignore[arg-type]

@@ -88,20 +88,20 @@ def draw_confusion(
 
 
 def code_use_figure(counts: NDArray[np.int64], title: str) -> Figure:
-    """Returns how often the codes of each book are used, the most used first.
+    """Returns how often the codes of each codebook are used, the most used first.
 
     Args:
-        counts: shape (books, book_size).
+        counts: shape (codebooks, codebook_size).
         title: of the picture.
     """
     figure = Figure(figsize=(8, 4.5), layout="constrained")
     axes = figure.add_subplot()
-    for book, used in enumerate(counts):
+    for codebook, used in enumerate(counts):
         share = np.sort(used)[::-1] / max(used.sum(), 1)
-        color = str(0.75 * book / len(counts))
-        label = f"book {book + 1}: {np.count_nonzero(used)} of {len(used)}"
+        color = str(0.75 * codebook / len(counts))
+        label = f"codebook {codebook + 1}: {np.count_nonzero(used)} of {len(used)}"
         axes.plot(np.arange(1, len(used) + 1), share, color=color, label=label)
-    axes.set(xlabel="code, by use", ylabel="share of the book's use", title=title)
+    axes.set(xlabel="code, by use", ylabel="share of the codebook's use", title=title)
     axes.set_yscale("log")
     axes.legend(ncols=3, loc="lower left", fontsize="small")
     return figure

@@ -24,19 +24,19 @@ NO_RECORDINGS = "No recording of this label is held out."
 
 
 def evaluate_tokenizer(
-    tokenizer: Tokenizer, recorded: Recorded, books: int | None = None
+    tokenizer: Tokenizer, recorded: Recorded, codebooks: int | None = None
 ) -> tuple[dict[str, Any], NDArray[np.int64]]:
-    """Returns the figures, and how often each code of each book is used.
+    """Returns the figures, and how often each code of each codebook is used.
 
     Args:
         tokenizer: knows the recordings' robot.
         recorded: whole stretches.
-        books: decodes from the coarsest so many; None: all.
+        codebooks: decodes from the coarsest so many; None: all.
 
     Returns:
         "labels" and "all" of recordings held out, the same under "train",
         "codebook_use" and "books", the share that is used of each; the counts have
-        shape (books, book_size).
+        shape (codebooks, codebook_size).
     """
     train, held_out = (
         [motion_clip(motion) for motion in side]
@@ -49,10 +49,10 @@ def evaluate_tokenizer(
     counts = code_counts(tokenizer, [*train, *held_out, *mirrors]).numpy()
     used = (counts > 0).mean(axis=1)
     figures = {
-        **_scores(tokenizer, held_out, books),
+        **_scores(tokenizer, held_out, codebooks),
         "codebook_use": float(used.mean()),
         "books": used.tolist(),
-        "train": _scores(tokenizer, train, books),
+        "train": _scores(tokenizer, train, codebooks),
     }
     for label in figures["train"]["labels"]:
         missing = {**dict.fromkeys(FIGURES), "reason": NO_RECORDINGS}
@@ -61,10 +61,10 @@ def evaluate_tokenizer(
 
 
 def _scores(
-    tokenizer: Tokenizer, clips: Sequence[Clip], books: int | None
+    tokenizer: Tokenizer, clips: Sequence[Clip], codebooks: int | None
 ) -> dict[str, Any]:
     labels = {
-        str(label): asdict(score_tokenizer(tokenizer, own, books))
+        str(label): asdict(score_tokenizer(tokenizer, own, codebooks))
         for label in LABELS
         if (own := [clip for clip in clips if clip.label == label])
     }

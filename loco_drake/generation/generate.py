@@ -26,7 +26,7 @@ def generate_motions(
     *,
     temperature: float = 1.0,
     top_p: float = 0.95,
-    pace: float | None = None,
+    speed_rank: float | None = None,
 ) -> list[Motion]:
     """Generates one motion for each seed, side by side.
 
@@ -39,20 +39,20 @@ def generate_motions(
         seeds: not negative; each motion depends on its own only.
         temperature: see :meth:`MotionModel.extend`.
         top_p: see there.
-        pace: see :meth:`MotionModel.start`.
+        speed_rank: see :meth:`MotionModel.start`.
 
     Raises:
         InputError: if an argument is not as said.
     """
     check_duration(duration)
     check_sampling(temperature, top_p)
-    check_pace(pace)
+    check_speed_rank(speed_rank)
     schedule = GaitSchedule((gait,)) if isinstance(gait, GaitLabel) else gait
     schedule.check_ends_by(duration)
     if any(seed < 0 for seed in seeds):
         raise InputError("Seeds must be 0 or more.")
     count = round(duration * FPS) + 1
-    stream = model.start(np.array(seeds), duration, pace=pace)
+    stream = model.start(np.array(seeds), duration, speed_rank=speed_rank)
     label = schedule.labels[0] if len(schedule.labels) == 1 else SEVERAL
     parts = []
     for chunk in range(-(-count // model.chunk_frames)):
@@ -86,7 +86,7 @@ def generate_motions(
                 "seed": str(seed),
                 "temperature": f"{temperature:g}",
                 "top_p": f"{top_p:g}",
-                "pace": f"{stream.pace[i]:.4g}",
+                "pace": f"{stream.speed_rank[i]:.4g}",
                 "tokenizer": model.tokenizer.fingerprint,
             },
             gait_changes=gait_changes if label == SEVERAL else (),
@@ -134,10 +134,10 @@ def check_sampling(temperature: float, top_p: float) -> None:
         raise InputError(f"top_p must be above 0 and at most 1, not {top_p:g}.")
 
 
-def check_pace(pace: float | None) -> None:
-    """Raises InputError unless the pace is None or in [0, 1]."""
-    if pace is not None and not 0 <= pace <= 1:
+def check_speed_rank(speed_rank: float | None) -> None:
+    """Raises InputError unless the speed rank is None or in [0, 1]."""
+    if speed_rank is not None and not 0 <= speed_rank <= 1:
         raise InputError(
             f"The pace must be from 0, the slowest that the gait was recorded at, to "
-            f"1, the fastest, not {pace:g}."
+            f"1, the fastest, not {speed_rank:g}."
         )

@@ -1,14 +1,14 @@
-"""A GPT that writes tokens of motion for a source, a gait, a pace and a duration.
+"""A GPT that writes tokens of motion for a gait, a speed and a duration.
 
-One transformer step per token. The codes of a token's books are drawn one after the
+One transformer step per token. The codes of a token's codebooks are drawn one after the
 other by small heads that see the transformer's output and the codes drawn so far,
-as residual books refine one another.
+as residual codebooks refine one another.
 """
 
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -31,8 +31,8 @@ class GeneratorConfig:
 
     Attributes:
         tokenizer: fingerprint of the tokenizer whose codes it writes.
-        books: how many of that tokenizer's codebooks it writes, the coarsest first.
-        book_size: codes in a book.
+        codebooks: how many of that tokenizer's codebooks it writes, the coarsest first.
+        codebook_size: codes in a codebook.
         frames_per_token: frames that a token stands for.
         labels: names of the gait labels it was trained on.
         window: earlier tokens that it looks at when a chunk begins.
@@ -42,9 +42,11 @@ class GeneratorConfig:
         dropout: probability, while training.
     """
 
+    BEFORE: ClassVar = {"books": "codebooks", "book_size": "codebook_size"}
+
     tokenizer: str
-    books: int
-    book_size: int
+    codebooks: int
+    codebook_size: int
     frames_per_token: int
     labels: tuple[str, ...]
     window: int = 16
@@ -88,10 +90,10 @@ class Block(nn.Module):
 
 
 class Generator(nn.Module):
-    """The GPT over tokens, conditioned at every step on label, pace and duration.
+    """The GPT over tokens, conditioned at every step on label, speed and duration.
 
     Step t is given the codes of token t - 1 and the condition of token t, and
-    predicts the codes of token t. A code of ``book_size`` stands for "nothing
+    predicts the codes of token t. A code of ``codebook_size`` stands for "nothing
     before": the start of a sequence.
 
     Args:
@@ -101,14 +103,15 @@ class Generator(nn.Module):
     def __init__(self, config: GeneratorConfig) -> None:
         super().__init__()
         self.config = config
-        width, books, size = config.width, config.books, config.book_size
+        width, codebooks, size = config.width, config.codebooks, config.codebook_size
         self.register_buffer(
             "one_hot", torch.tensor(ONE_HOT, dtype=torch.float32), persistent=False
         )
         self.one_hot: Tensor
-        # Tables of all books lie in one; book j begins at row j * (size + 1).
-        self.codes_in = nn.Embedding(books * (size + 1), width)
+        # Tables of all codebooks lie in one; codebook j begins at row j * (size + 1).
+        self.codes_in = nn.Embedding(codebooks * (size + 1), width)
         self.gait_in = nn.Linear(ONE_HOT_SIZE, width, bias=False)
+        # pace_in and earlier_books are the names in the shipped weights.
         self.pace_in = nn.Embedding(speed_rank.BINS, width)
         # Stand heights per second, see speed_rank.speed_edges.
         self.register_buffer(
@@ -119,11 +122,11 @@ class Generator(nn.Module):
         self.dropout = nn.Dropout(config.dropout)
         self.blocks = nn.ModuleList(Block(config) for _ in range(config.layers))
         self.norm = nn.LayerNorm(width)
-        self.earlier_books = nn.Embedding(books * (size + 1), width)
-        self.head_in = nn.ModuleList(nn.Linear(width, width) for _ in range(books))
+        self.earlier_books = nn.Embedding(codebooks * (size + 1), width)
+        self.head_in = nn.ModuleList(nn.Linear(width, width) for _ in range(codebooks))
         self.head_out = nn.ModuleList(
             nn.Sequential(nn.GELU(), nn.LayerNorm(width), nn.Linear(width, size))
-            for _ in range(books)
+            for _ in range(codebooks)
         )
         self.apply(_initialize)
 
@@ -131,22 +134,22 @@ class Generator(nn.Module):
         self,
         before: Tensor,
         labels: Tensor,
-        paces: Tensor,
+        speed_bins: Tensor,
         duration: Tensor,
         cache: Cache | None = None,
     ) -> tuple[Tensor, Cache]:
         """Returns what the heads are given, shape (B, T, width), and a cache.
 
         Args:
-            before: codes of the token before each step, shape (B, T, books).
+            before: codes of the token before each step, shape (B, T, codebooks).
             labels: index into gaits.LABELS of each step's token, shape (B, T).
-            paces: bin of its pace, shape (B, T) or (B, 1).
+            speed_bins: see :mod:`.speed_rank`, shape (B, T) or (B, 1).
             duration: bin of the sequence's duration, shape (B,).
             cache: that of the steps before, then T must be 1.
         """
-        offset = torch.arange(self.config.books) * (self.config.book_size + 1)
+        offset = torch.arange(self.config.codebooks) * (self.config.codebook_size + 1)
         x = self.codes_in(before + offset).sum(dim=-2)  # (B, T, width)
-        x = x + self.gait_in(self.one_hot[labels]) + self.pace_in(paces)
+        x = x + self.gait_in(self.one_hot[labels]) + self.pace_in(speed_bins)
         x = x + self.duration_in(duration)[:, None]
         x = self.dropout(x)
         present: Cache = []
@@ -155,41 +158,45 @@ class Generator(nn.Module):
             present.append(kv)
         return self.norm(x), present
 
-    def head(self, book: int, hidden: Tensor, earlier: Tensor) -> Tensor:
-        """Returns logits (..., book_size) of one book.
+    def head(self, codebook: int, hidden: Tensor, earlier: Tensor) -> Tensor:
+        """Returns logits (..., codebook_size) of one codebook.
 
         Args:
-            book: which one.
+            codebook: which one.
             hidden: output of the trunk, shape (..., width).
-            earlier: sum of :meth:`drawn` over the books before, shape (..., width).
+            earlier: sum of :meth:`drawn` over the codebooks before, shape (..., width).
         """
-        logits: Tensor = self.head_out[book](self.head_in[book](hidden) + earlier)
+        logits: Tensor = self.head_out[codebook](
+            self.head_in[codebook](hidden) + earlier
+        )
         return logits
 
-    def drawn(self, book: int, codes: Tensor) -> Tensor:
-        """Returns what the heads of later books are told of a book's codes (...)."""
-        told: Tensor = self.earlier_books(codes + book * (self.config.book_size + 1))
+    def drawn(self, codebook: int, codes: Tensor) -> Tensor:
+        """Returns what the heads of later codebooks are told of codes (...)."""
+        told: Tensor = self.earlier_books(
+            codes + codebook * (self.config.codebook_size + 1)
+        )
         return told
 
     def forward(
         self,
         before: Tensor,
         labels: Tensor,
-        paces: Tensor,
+        speed_bins: Tensor,
         duration: Tensor,
         codes: Tensor,
     ) -> Tensor:
-        """Returns logits (B, T, books, book_size) of the tokens ``codes``.
+        """Returns logits (B, T, codebooks, codebook_size) of the tokens ``codes``.
 
-        Logits of a book depend on ``before`` up to their step and, within the step,
-        on ``codes`` of earlier books. For the arguments see :meth:`trunk`.
+        Logits of a codebook depend on ``before`` up to their step and, within the step,
+        on ``codes`` of earlier codebooks. For the arguments see :meth:`trunk`.
         """
-        hidden, _ = self.trunk(before, labels, paces, duration)
+        hidden, _ = self.trunk(before, labels, speed_bins, duration)
         earlier = torch.zeros_like(hidden)
         logits = []
-        for book in range(self.config.books):
-            logits.append(self.head(book, hidden, earlier))
-            earlier = earlier + self.drawn(book, codes[..., book])
+        for codebook in range(self.config.codebooks):
+            logits.append(self.head(codebook, hidden, earlier))
+            earlier = earlier + self.drawn(codebook, codes[..., codebook])
         return torch.stack(logits, dim=-2)
 
     @torch.inference_mode()
@@ -197,46 +204,46 @@ class Generator(nn.Module):
         self,
         history: Tensor,
         labels: Tensor,
-        paces: Tensor,
+        speed_bins: Tensor,
         duration: Tensor,
         uniforms: Tensor,
         temperature: float,
         top_p: float,
     ) -> Tensor:
-        """Returns the codes (B, n, books) of n tokens that go on from ``history``.
+        """Returns the codes (B, n, codebooks) of n tokens that go on from ``history``.
 
         Args:
-            history: codes of the H >= 0 tokens before, shape (B, H, books).
+            history: codes of the H >= 0 tokens before, shape (B, H, codebooks).
             labels: of the tokens from one after the first in ``history`` to the last
                 new one (without history: of the new ones), shape (B, H - 1 + n), or
                 (B, n).
-            paces: bin of the sequence's pace, shape (B, 1).
+            speed_bins: of the sequence, shape (B, 1).
             duration: bin of the sequence's duration, shape (B,).
-            uniforms: the dice, in [0, 1), shape (B, n, books).
+            uniforms: the dice, in [0, 1), shape (B, n, codebooks).
             temperature: divides the logits; 0 takes the likeliest code.
             top_p: only the likeliest codes that together reach it can be drawn.
         """
-        batch, steps, books = uniforms.shape
+        batch, steps, codebooks = uniforms.shape
         if history.shape[1] == 0:
-            history = torch.full((batch, 1, books), self.config.book_size)
+            history = torch.full((batch, 1, codebooks), self.config.codebook_size)
         given = history.shape[1]
-        hidden, cache = self.trunk(history, labels[:, :given], paces, duration)
+        hidden, cache = self.trunk(history, labels[:, :given], speed_bins, duration)
         hidden = hidden[:, -1]
         tokens = []
         for step in range(steps):
             earlier = torch.zeros_like(hidden)
             codes = []
-            for book in range(books):
-                logits = self.head(book, hidden, earlier)
-                drawn = draw(logits, uniforms[:, step, book], temperature, top_p)
+            for codebook in range(codebooks):
+                logits = self.head(codebook, hidden, earlier)
+                drawn = draw(logits, uniforms[:, step, codebook], temperature, top_p)
                 codes.append(drawn)
-                if book < books - 1:
-                    earlier = earlier + self.drawn(book, drawn)
-            token = torch.stack(codes, dim=-1)[:, None]  # (B, 1, books)
+                if codebook < codebooks - 1:
+                    earlier = earlier + self.drawn(codebook, drawn)
+            token = torch.stack(codes, dim=-1)[:, None]  # (B, 1, codebooks)
             tokens.append(token)
             if step < steps - 1:
                 label = labels[:, given + step, None]
-                hidden, cache = self.trunk(token, label, paces, duration, cache)
+                hidden, cache = self.trunk(token, label, speed_bins, duration, cache)
                 hidden = hidden[:, -1]
         return torch.cat(tokens, dim=1)
 

@@ -38,10 +38,10 @@ class Stream:
     Attributes:
         seeds: of each motion, shape (B,).
         duration: how long each is to last, in s, shape (B,).
-        pace: of each, in [0, 1], see :mod:`loco_drake.generation.speed_rank`,
+        speed_rank: of each, in [0, 1], see :mod:`loco_drake.generation.speed_rank`,
             shape (B,).
         chunk: how many times the stream was extended.
-        tokens: the latest ones, shape (B, n, books).
+        tokens: the latest ones, shape (B, n, codebooks).
         labels: of ``tokens``, index into gaits.LABELS, shape (B, n).
         footing: of base and feet after the frame held back.
         q: the last frame given out and the one held back, shape (B, 2, 19), or
@@ -51,7 +51,7 @@ class Stream:
 
     seeds: Integers
     duration: Array
-    pace: Array
+    speed_rank: Array
     chunk: int
     tokens: Integers
     labels: Integers
@@ -145,7 +145,7 @@ class MotionModel:
         seeds: Integers,
         duration: Array | float = 3600.0,
         pose: Array | None = None,
-        pace: Array | float | None = None,
+        speed_rank: Array | float | None = None,
     ) -> Stream:
         """Returns a stream of B motions of which nothing is generated yet.
 
@@ -154,22 +154,24 @@ class MotionModel:
                 becomes depends on its own seed only.
             duration: how long the motions are to last, in s, shape (B,) or for all.
             pose: x, y, yaw of the first frame in m and rad, shape (B, 3); default 0.
-            pace: rank in [0, 1] of the speed among those at which the gait was
+            speed_rank: rank in [0, 1] of the speed among those at which the gait was
                 recorded, shape (B,) or for all; by default each seed has its own.
         """
         seeds = np.array(seeds, dtype=np.int64)
         batch = len(seeds)
-        books = self.generator.config.books
+        codebooks = self.generator.config.codebooks
         return Stream(
             seeds=seeds,
             duration=np.broadcast_to(np.asarray(duration, np.float64), (batch,)).copy(),
-            pace=(
+            speed_rank=(
                 drawn_rank(seeds)
-                if pace is None
-                else np.broadcast_to(np.asarray(pace, np.float64), (batch,)).copy()
+                if speed_rank is None
+                else np.broadcast_to(
+                    np.asarray(speed_rank, np.float64), (batch,)
+                ).copy()
             ),
             chunk=0,
-            tokens=np.zeros((batch, 0, books), dtype=np.int64),
+            tokens=np.zeros((batch, 0, codebooks), dtype=np.int64),
             labels=np.zeros((batch, 0), dtype=np.int64),
             footing=start_footing(
                 np.zeros((batch, 3)) if pose is None else np.array(pose, np.float64)
@@ -214,7 +216,7 @@ class MotionModel:
         # The first tokens are only there for the decoder to look back at.
         lead = 0 if stream.chunk else self._lead
         new = np.concatenate((np.repeat(new[:, :1], lead, axis=1), new), axis=1)
-        shape = (lead + steps, self.generator.config.books)
+        shape = (lead + steps, self.generator.config.codebooks)
         dice = [uniforms(int(seed), stream.chunk, shape) for seed in stream.seeds]
         window = self.generator.config.window
         history, given = stream.tokens[:, -window:], stream.labels[:, -window:]
@@ -222,7 +224,7 @@ class MotionModel:
             drawn = self._writer.sample(
                 torch.from_numpy(history.copy()),
                 torch.from_numpy(np.concatenate((given[:, 1:], new), axis=1)),
-                torch.from_numpy(rank_bin(stream.pace)[:, None]),
+                torch.from_numpy(rank_bin(stream.speed_rank)[:, None]),
                 torch.from_numpy(duration_bin(stream.duration)),
                 torch.from_numpy(np.stack(dice)),
                 temperature,
@@ -240,7 +242,7 @@ class MotionModel:
 
         Args:
             stream: as it stands; it is left alone.
-            tokens: shape (B, n, books).
+            tokens: shape (B, n, codebooks).
             labels: of the tokens, shape (B, n).
         """
         batch = len(tokens)

@@ -21,7 +21,7 @@ Integers = NDArray[np.int64]
 
 BINS = 16
 SMOOTHING = 2.0  # s over which speed is averaged
-_DICE = 2**62  # where the dice for the pace lie; chunks count up from 0
+_DICE = 2**62  # where the dice for the rank lie; chunks count up from 0
 
 
 def token_speeds(features: Array, frames_per_token: int) -> Array:

@@ -9,7 +9,7 @@ import math
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor, nn
@@ -30,9 +30,11 @@ class TokenizerConfig:
         depth: residual blocks at that rate, in encoder and decoder each.
         frame_width: channels of the decoder's layers at the rate of frames.
         code_size: dimension of a code.
-        books: residual codebooks; a token is one code of each.
-        book_size: codes in a book.
+        codebooks: residual codebooks; a token is one code of each.
+        codebook_size: codes in a codebook.
     """
+
+    BEFORE: ClassVar = {"books": "codebooks", "book_size": "codebook_size"}
 
     robots: tuple[str, ...] = ("go2",)
     frames_per_token: int = 4
@@ -40,8 +42,8 @@ class TokenizerConfig:
     depth: int = 3
     frame_width: int = 48
     code_size: int = 48
-    books: int = 12
-    book_size: int = 128
+    codebooks: int = 12
+    codebook_size: int = 128
 
 
 class Tokenizer(nn.Module):
@@ -70,7 +72,8 @@ class Tokenizer(nn.Module):
         self.encoder = nn.Sequential(*(ConvBlock(width) for _ in range(config.depth)))
         self.encoder_out = nn.Linear(width, config.code_size)
         self.register_buffer(
-            "codebooks", torch.zeros(config.books, config.book_size, config.code_size)
+            "codebooks",
+            torch.zeros(config.codebooks, config.codebook_size, config.code_size),
         )
         self.codebooks: Tensor
         self.decoder_in = nn.Linear(config.code_size, width)
@@ -107,20 +110,20 @@ class Tokenizer(nn.Module):
         return out
 
     def encode(self, features: Tensor, robot: Tensor) -> Tensor:
-        """Returns codes (B, T / frames_per_token, books); see :meth:`embed`."""
+        """Returns codes (B, T / frames_per_token, codebooks); see :meth:`embed`."""
         residual = self.embed(features, robot)
         codes = []
-        for book in self.codebooks:
-            nearest = torch.cdist(residual, book[None]).argmin(dim=-1)
+        for codebook in self.codebooks:
+            nearest = torch.cdist(residual, codebook[None]).argmin(dim=-1)
             codes.append(nearest)
-            residual = residual - book[nearest]
+            residual = residual - codebook[nearest]
         return torch.stack(codes, dim=-1)
 
     def decode(self, codes: Tensor, robot: Tensor) -> Tensor:
         """Returns features (B, n * frames_per_token, SIZE), contacts as probabilities.
 
         Args:
-            codes: of all books or of the first few, shape (B, n, <= books).
+            codes: of all codebooks or of the first few, shape (B, n, <= codebooks).
             robot: index into ``config.robots``, shape (B,).
         """
         features = self.decode_embedded(self.lookup(codes), robot)
@@ -128,9 +131,9 @@ class Tokenizer(nn.Module):
         return torch.cat((features[..., : CONTACTS.start], contacts), dim=-1)
 
     def lookup(self, codes: Tensor) -> Tensor:
-        """Returns the sum of the books' vectors: (B, n, books) -> (B, n, code_size)."""
-        books = torch.arange(codes.shape[-1])
-        total: Tensor = self.codebooks[books, codes].sum(dim=-2)
+        """Returns sums of code vectors: (B, n, codebooks) -> (B, n, code_size)."""
+        codebooks = torch.arange(codes.shape[-1])
+        total: Tensor = self.codebooks[codebooks, codes].sum(dim=-2)
         return total
 
     def decode_embedded(self, embedded: Tensor, robot: Tensor) -> Tensor:
@@ -146,7 +149,8 @@ class Tokenizer(nn.Module):
     @property
     def fingerprint(self) -> str:
         """Short name of exactly these weights in 16 bits, as they are shipped."""
-        digest = sha256(repr(self.config).encode())
+        # By the names that fields had in the first weights.
+        digest = sha256(repr(self.config).replace("codebook", "book").encode())
         for name, value in sorted(self.state_dict().items()):
             data = value.half() if value.is_floating_point() else value
             digest.update(name.encode() + data.contiguous().numpy().tobytes())

@@ -29,14 +29,14 @@ class TokenizerScore:
 
 
 def score_tokenizer(
-    tokenizer: Tokenizer, clips: Sequence[Clip], books: int | None = None
+    tokenizer: Tokenizer, clips: Sequence[Clip], codebooks: int | None = None
 ) -> TokenizerScore:
     """Returns how well whole clips survive the way to tokens and back.
 
     Args:
         tokenizer: knows the clips' robots.
         clips: frames beyond the last whole token are left out.
-        books: decodes these many codebooks only, the coarsest; None: all.
+        codebooks: decodes these many codebooks only, the coarsest; None: all.
     """
     toes = Toes([get_robot(name) for name in tokenizer.config.robots])
     joints, distances = [], []
@@ -44,7 +44,7 @@ def score_tokenizer(
         target = clip_tensor(tokenizer, clip)
         robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
         with torch.inference_mode(), single_thread():
-            codes = tokenizer.encode(target, robot)[..., :books]
+            codes = tokenizer.encode(target, robot)[..., :codebooks]
             output = tokenizer.decode(codes, robot)
             apart = toes.positions(output, robot) - toes.positions(target, robot)
         joints.append((output - target)[..., JOINTS].square().flatten())
@@ -56,20 +56,20 @@ def score_tokenizer(
 
 
 def code_counts(tokenizer: Tokenizer, clips: Sequence[Clip]) -> Tensor:
-    """Returns how often each code of each book is used, (books, book_size)."""
+    """Returns how often each code is used, shape (codebooks, codebook_size)."""
     config = tokenizer.config
-    counts = torch.zeros(config.books, config.book_size, dtype=torch.long)
+    counts = torch.zeros(config.codebooks, config.codebook_size, dtype=torch.long)
     for clip in clips:
         robot = torch.tensor([config.robots.index(clip.robot)])
         with torch.inference_mode(), single_thread():
             codes = tokenizer.encode(clip_tensor(tokenizer, clip), robot)[0]
-        for book, used in enumerate(codes.T):
-            counts[book] += torch.bincount(used, minlength=config.book_size)
+        for codebook, used in enumerate(codes.T):
+            counts[codebook] += torch.bincount(used, minlength=config.codebook_size)
     return counts
 
 
 def codebook_use(tokenizer: Tokenizer, clips: Sequence[Clip]) -> float:
-    """Returns the share of all books' codes that the clips need, in [0, 1]."""
+    """Returns the share of all codebooks' codes that the clips need, in [0, 1]."""
     return float((code_counts(tokenizer, clips) > 0).float().mean())
 
 

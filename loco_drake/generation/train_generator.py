@@ -46,7 +46,7 @@ class Codes:
 
     Attributes:
         label: index into gaits.LABELS.
-        codes: shape (n, books).
+        codes: shape (n, codebooks).
         speeds: around each token, see :func:`speed_rank.token_speeds`, shape (n,).
     """
 
@@ -59,9 +59,9 @@ class Codes:
 
 
 def encode_clips(
-    tokenizer: Tokenizer, clips: Sequence[Clip], books: int
+    tokenizer: Tokenizer, clips: Sequence[Clip], codebooks: int
 ) -> list[Codes]:
-    """Returns the tokens of each clip, the first ``books`` codes of each."""
+    """Returns the tokens of each clip, the first ``codebooks`` codes of each."""
     encoded = []
     for clip in clips:
         robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
@@ -70,7 +70,7 @@ def encode_clips(
         speeds = speed_rank.token_speeds(
             clip.features, tokenizer.config.frames_per_token
         )
-        encoded.append(Codes(clip.label.index, codes[0, :, :books].numpy(), speeds))
+        encoded.append(Codes(clip.label.index, codes[0, :, :codebooks].numpy(), speeds))
     return encoded
 
 
@@ -123,7 +123,9 @@ def train_generator(
         known = ", ".join(tokenizer.config.robots)
         raise InputError(f"The tokenizer knows {known}, not {', '.join(missing)}.")
     encoded = encode_clips(
-        tokenizer, stitched_clips(library.train, stitched, settings.seed), config.books
+        tokenizer,
+        stitched_clips(library.train, stitched, settings.seed),
+        config.codebooks,
     )
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
@@ -141,7 +143,7 @@ def train_generator(
     run = {
         "network": asdict(config),
         "motions": library.summary,
-        "books": config.books,
+        "books": config.codebooks,
         "stitched": stitched,
     }
     result = train("generator", generator, loss_of_batch, settings, run)
@@ -164,31 +166,31 @@ def make_batch(
     one of a longer performance.
 
     Returns:
-        before, labels, paces, duration and codes as :meth:`Generator.forward` takes
-        them.
+        before, labels, speed_bins, duration and codes, as :meth:`Generator.forward`
+        takes them.
     """
     length = config.window + GROWTH
     batch = len(chosen)
-    windows = np.empty((batch, length + 1, config.books), dtype=np.int64)
-    paces = np.empty((batch, length), dtype=np.int64)
+    windows = np.empty((batch, length + 1, config.codebooks), dtype=np.int64)
+    speed_bins = np.empty((batch, length), dtype=np.int64)
     for i, sequence in enumerate(chosen):
         # The token before the window is all that the first step is told.
         start = random.integers(len(sequence) - length)
         windows[i] = sequence.codes[start : start + length + 1]
         speeds = sequence.speeds[start + 1 : start + length + 1]
-        paces[i] = speed_rank.speed_bin(edges.numpy(), sequence.label, speeds)
-    windows[random.random(batch) < NO_HISTORY, 0] = config.book_size
+        speed_bins[i] = speed_rank.speed_bin(edges.numpy(), sequence.label, speeds)
+    windows[random.random(batch) < NO_HISTORY, 0] = config.codebook_size
     before, codes = windows[:, :-1].copy(), windows[:, 1:].copy()
     labels = np.repeat([[sequence.label] for sequence in chosen], length, axis=1)
     shortest = length * config.frames_per_token / FPS
     seconds = shortest * (4 * LONGEST / shortest) ** random.random(batch)
     wrong = random.random(before.shape) < CORRUPTION * random.random((batch, 1, 1)) * 2
-    wrong &= before < config.book_size
-    before[wrong] = random.integers(config.book_size, size=int(wrong.sum()))
+    wrong &= before < config.codebook_size
+    before[wrong] = random.integers(config.codebook_size, size=int(wrong.sum()))
     return (
         torch.from_numpy(before),
         torch.from_numpy(labels),
-        torch.from_numpy(paces),
+        torch.from_numpy(speed_bins),
         torch.from_numpy(duration_bin(seconds)),
         torch.from_numpy(codes),
     )
@@ -198,12 +200,12 @@ def generator_loss(
     generator: Generator,
     before: Tensor,
     labels: Tensor,
-    paces: Tensor,
+    speed_bins: Tensor,
     duration: Tensor,
     codes: Tensor,
 ) -> Tensor:
     """Returns the mean cross-entropy in nats a code; see :meth:`Generator.forward`."""
-    logits = generator(before, labels, paces, duration, codes)
+    logits = generator(before, labels, speed_bins, duration, codes)
     return functional.cross_entropy(logits.flatten(0, 2), codes.flatten())
 
 
@@ -213,16 +215,18 @@ def score_generator(
     """Returns the cross-entropy of whole clips in nats a code."""
     total, count = 0.0, 0
     config = generator.config
-    for sequence in encode_clips(tokenizer, clips, config.books):
+    for sequence in encode_clips(tokenizer, clips, config.codebooks):
         codes = torch.from_numpy(sequence.codes)[None]
-        first = torch.full((1, 1, config.books), config.book_size)
+        first = torch.full((1, 1, config.codebooks), config.codebook_size)
         labels = torch.full(codes.shape[:2], sequence.label)
         edges = generator.speed_edges.numpy()
         bins = speed_rank.speed_bin(edges, sequence.label, sequence.speeds)
-        paces = torch.from_numpy(bins)[None]
+        speed_bins = torch.from_numpy(bins)[None]
         duration = torch.from_numpy(duration_bin(np.array([LONGEST])))
         before = torch.cat((first, codes[:, :-1]), dim=1)
         with torch.inference_mode(), single_thread():
-            loss = generator_loss(generator, before, labels, paces, duration, codes)
+            loss = generator_loss(
+                generator, before, labels, speed_bins, duration, codes
+            )
         total, count = total + float(loss) * codes.numel(), count + codes.numel()
     return total / max(count, 1)

@@ -2,8 +2,8 @@
 
 The codebooks follow exponential moving averages of what they stand for, and codes
 that nothing is near to are taken from the batch anew, both by
-vector-quantize-pytorch. The finest books are left out at random, so that the decoder
-makes the best of the coarse ones alone.
+vector-quantize-pytorch. The finest codebooks are left out at random, so that the
+decoder makes the best of the coarse ones alone.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -32,7 +32,9 @@ from loco_drake.motion.gaits import LABELS
 Array = NDArray[np.float64]
 
 BATCH = 32  # windows
-FEWEST_BOOKS = 2  # batches are decoded from between so many and all of the books
+FEWEST_CODEBOOKS = (
+    2  # batches are decoded from between so many and all of the codebooks
+)
 
 # Weights of the losses; each is about 1 before training.
 WEIGHTS = {
@@ -100,14 +102,14 @@ class LearningTokenizer(nn.Module):
         self.tokenizer = tokenizer
         self.quantizer = ResidualVQ(
             dim=tokenizer.config.code_size,
-            num_quantizers=tokenizer.config.books,
-            codebook_size=tokenizer.config.book_size,
+            num_quantizers=tokenizer.config.codebooks,
+            codebook_size=tokenizer.config.codebook_size,
             kmeans_init=True,
             kmeans_iters=20,
             decay=0.98,
             threshold_ema_dead_code=1,
             quantize_dropout=True,
-            quantize_dropout_cutoff_index=FEWEST_BOOKS - 1,
+            quantize_dropout_cutoff_index=FEWEST_CODEBOOKS - 1,
         )
 
     def forward(

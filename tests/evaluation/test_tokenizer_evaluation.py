@@ -57,13 +57,13 @@ def test_labels_weigh_the_same_and_missing_ones_say_why(tokenizer, recorded):
 
 
 def test_use_of_codes_by_hand(tokenizer, recorded):
-    """A clip of one token uses one code of each book: 1/16."""
+    """A clip of one token uses one code of each codebook: 1/16."""
     clip = motion_clip(recorded.train[0].slice(0, 4))
     assert codebook_use(tokenizer, [clip]) == pytest.approx(1 / 16)
     codes = tokenizer.encode(clip_tensor(tokenizer, clip), torch.tensor([0]))[0, 0]
     counts = code_counts(tokenizer, [clip, clip])
-    for book, code in enumerate(codes):
-        assert counts[book, code] == counts[book].sum() == 2
+    for codebook, code in enumerate(codes):
+        assert counts[codebook, code] == counts[codebook].sum() == 2
 
 
 def test_error_of_joints_by_hand(tokenizer, recorded):
@@ -80,7 +80,7 @@ def test_error_of_joints_by_hand(tokenizer, recorded):
 
 def test_fewer_books_are_another_score(tokenizer, recorded):
     all_books, _ = evaluate_tokenizer(tokenizer, recorded)
-    one_book, _ = evaluate_tokenizer(tokenizer, recorded, books=1)
+    one_book, _ = evaluate_tokenizer(tokenizer, recorded, codebooks=1)
     assert one_book["all"] != all_books["all"]
     assert one_book["codebook_use"] == all_books["codebook_use"]
 

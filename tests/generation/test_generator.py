@@ -17,8 +17,8 @@ from loco_drake.generation.speed_rank import BINS
 
 TINY = GeneratorConfig(
     tokenizer="0" * 16,
-    books=3,
-    book_size=8,
+    codebooks=3,
+    codebook_size=8,
     frames_per_token=4,
     labels=("dog-pace", "dog-trot"),
     window=6,
@@ -42,73 +42,73 @@ def inputs(steps=10, batch=2):
     torch.manual_seed(1)
     before = torch.randint(8, (batch, steps, 3))
     labels = torch.randint(2, (batch, steps))
-    paces = torch.randint(BINS, (batch, 1))
+    speed_bins = torch.randint(BINS, (batch, 1))
     duration = torch.randint(DURATION_BINS, (batch,))
     codes = torch.randint(8, (batch, steps, 3))
-    return before, labels, paces, duration, codes
+    return before, labels, speed_bins, duration, codes
 
 
 def test_changing_a_later_token_leaves_earlier_logits_alone(generator):
-    before, labels, paces, duration, codes = inputs()
+    before, labels, speed_bins, duration, codes = inputs()
     other = before.clone()
     other[:, 6] = (other[:, 6] + 1) % 8
     with torch.no_grad():
-        a = generator(before, labels, paces, duration, codes)
-        b = generator(other, labels, paces, duration, codes)
+        a = generator(before, labels, speed_bins, duration, codes)
+        b = generator(other, labels, speed_bins, duration, codes)
     torch.testing.assert_close(a[:, :6], b[:, :6], atol=1e-6, rtol=0)
     assert (a[:, 6:] - b[:, 6:]).abs().amax(dim=(0, 2, 3)).min() > 1e-3
 
 
 def test_changing_a_later_label_leaves_earlier_logits_alone(generator):
-    before, labels, paces, duration, codes = inputs()
+    before, labels, speed_bins, duration, codes = inputs()
     other = labels.clone()
     other[:, 6] = 1 - other[:, 6]
     with torch.no_grad():
-        a = generator(before, labels, paces, duration, codes)
-        b = generator(before, other, paces, duration, codes)
+        a = generator(before, labels, speed_bins, duration, codes)
+        b = generator(before, other, speed_bins, duration, codes)
     torch.testing.assert_close(a[:, :6], b[:, :6], atol=1e-6, rtol=0)
     assert (a[:, 6:] - b[:, 6:]).abs().amax(dim=(0, 2, 3)).min() > 1e-3
 
 
 def test_a_book_sees_the_earlier_books_of_its_token_only(generator):
-    before, labels, paces, duration, codes = inputs()
+    before, labels, speed_bins, duration, codes = inputs()
     other = codes.clone()
     other[:, 4, 1] = (other[:, 4, 1] + 1) % 8
     with torch.no_grad():
-        a = generator(before, labels, paces, duration, codes)
-        b = generator(before, labels, paces, duration, other)
-    changed = (a - b).abs().amax(dim=(0, 3)) > 1e-6  # (steps, books)
+        a = generator(before, labels, speed_bins, duration, codes)
+        b = generator(before, labels, speed_bins, duration, other)
+    changed = (a - b).abs().amax(dim=(0, 3)) > 1e-6  # (steps, codebooks)
     expected = torch.zeros(10, 3, dtype=torch.bool)
     expected[4, 2] = True
     assert torch.equal(changed, expected)
 
 
 def test_the_condition_counts(generator):
-    before, labels, paces, duration, codes = inputs()
+    before, labels, speed_bins, duration, codes = inputs()
     with torch.no_grad():
-        a = generator(before, labels, paces, duration, codes)
-        b = generator(before, labels, paces, (duration + 5) % DURATION_BINS, codes)
-        c = generator(before, labels, (paces + 5) % BINS, duration, codes)
+        a = generator(before, labels, speed_bins, duration, codes)
+        b = generator(before, labels, speed_bins, (duration + 5) % DURATION_BINS, codes)
+        c = generator(before, labels, (speed_bins + 5) % BINS, duration, codes)
     assert (a - b).abs().amin(dim=(1, 2)).max() > 1e-3
     assert (a - c).abs().amin(dim=(1, 2)).max() > 1e-3
 
 
 def test_sampling_with_a_cache_is_the_plain_network(generator):
     """Temperature 0 against the likeliest code of the whole forward pass."""
-    history, labels, paces, duration, _ = inputs(steps=5)
+    history, labels, speed_bins, duration, _ = inputs(steps=5)
     labels = torch.randint(2, (2, 5 - 1 + 4))
     dice = torch.rand(2, 4, 3, dtype=torch.float64)
-    drawn = generator.sample(history, labels, paces, duration, dice, 0.0, 1.0)
+    drawn = generator.sample(history, labels, speed_bins, duration, dice, 0.0, 1.0)
     sequence = history
     for step in range(4):
         token = torch.zeros(2, 1, 3, dtype=torch.long)
-        for book in range(3):
+        for codebook in range(3):
             guess = torch.cat((sequence[:, 1:], token), dim=1)
             with torch.no_grad():
                 logits = generator(
-                    sequence, labels[:, : 5 + step], paces, duration, guess
+                    sequence, labels[:, : 5 + step], speed_bins, duration, guess
                 )
-            token[:, 0, book] = logits[:, -1, book].argmax(dim=-1)
+            token[:, 0, codebook] = logits[:, -1, codebook].argmax(dim=-1)
         assert torch.equal(drawn[:, step], token[:, 0])
         sequence = torch.cat((sequence, token), dim=1)
 
@@ -163,10 +163,10 @@ def test_saved_weights_come_back(generator, tmp_path):
     save_generator(generator, path, {})
     loaded = load_generator(path)
     assert loaded.config == TINY
-    before, labels, paces, duration, codes = inputs()
+    before, labels, speed_bins, duration, codes = inputs()
     with torch.no_grad():
-        a = generator(before, labels, paces, duration, codes)
-        b = loaded(before, labels, paces, duration, codes)
+        a = generator(before, labels, speed_bins, duration, codes)
+        b = loaded(before, labels, speed_bins, duration, codes)
     torch.testing.assert_close(a, b, atol=0.05, rtol=0.01)  # 16 bits
 
 

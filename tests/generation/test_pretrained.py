@@ -88,8 +88,10 @@ def test_a_faster_pace_is_faster_and_is_kept(label):
     """Speeds rise with the rank, and a motion stays within those of its label."""
     model = pretrained_motion_model("go2")
     speeds = []
-    for pace in (0.05, 0.5, 0.95):
-        motions = generate_motions(model, parse_label(label), 8.0, range(4), pace=pace)
+    for rank in (0.05, 0.5, 0.95):
+        motions = generate_motions(
+            model, parse_label(label), 8.0, range(4), speed_rank=rank
+        )
         speeds.append(np.mean([forward_speed(model.robot, m) for m in motions]))
     edges = model.generator.speed_edges[parse_label(label).index].numpy()
     edges = edges.astype(float) * model.robot.stand_height

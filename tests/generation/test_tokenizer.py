@@ -11,7 +11,7 @@ from loco_drake.generation.tokenizer import (
 )
 from loco_drake.generation.train_tokenizer import LearningTokenizer
 
-TINY = TokenizerConfig(width=16, depth=2, frame_width=8, books=3, book_size=8)
+TINY = TokenizerConfig(width=16, depth=2, frame_width=8, codebooks=3, codebook_size=8)
 
 
 @pytest.fixture
@@ -27,18 +27,20 @@ ROBOT = torch.zeros(1, dtype=torch.long)
 
 
 def test_codes_are_the_nearest_of_each_residual(tokenizer):
-    """Brute force over all codes, book by book."""
+    """Brute force over all codes, codebook by codebook."""
     features = torch.randn(1, 40, SIZE)
     with torch.no_grad():
         codes = tokenizer.encode(features, ROBOT)
         residual = tokenizer.embed(features, ROBOT)[0].double()
-    books = tokenizer.codebooks.double()
-    assert codes.shape == (1, 10, TINY.books)
-    for book in range(TINY.books):
+    codebooks = tokenizer.codebooks.double()
+    assert codes.shape == (1, 10, TINY.codebooks)
+    for codebook in range(TINY.codebooks):
         for step in range(10):
-            distances = [float((residual[step] - c).norm()) for c in books[book]]
-            assert codes[0, step, book] == distances.index(min(distances))
-        residual = residual - books[book][codes[0, :, book]]
+            distances = [
+                float((residual[step] - c).norm()) for c in codebooks[codebook]
+            ]
+            assert codes[0, step, codebook] == distances.index(min(distances))
+        residual = residual - codebooks[codebook][codes[0, :, codebook]]
 
 
 def test_the_network_is_the_one_that_was_trained():

@@ -33,7 +33,7 @@ from loco_drake.generation.train_tokenizer import (
 from loco_drake.generation.training_motions import Clip, load_library
 from loco_drake.motion.gaits import parse_label
 
-TINY = TokenizerConfig(width=24, depth=1, frame_width=8, books=2, book_size=16)
+TINY = TokenizerConfig(width=24, depth=1, frame_width=8, codebooks=2, codebook_size=16)
 
 
 @pytest.fixture(scope="module")
@@ -51,8 +51,8 @@ def tokenizer(library, tmp_path_factory):
 def generator_config(tokenizer):
     return GeneratorConfig(
         tokenizer=tokenizer.fingerprint,
-        books=2,
-        book_size=16,
+        codebooks=2,
+        codebook_size=16,
         frames_per_token=4,
         labels=("dog-pace", "dog-trot"),
         window=8,
@@ -170,18 +170,20 @@ def test_a_damaged_checkpoint_is_refused(library, tmp_path):
 def test_windows_are_shifted_by_one_token(library, tokenizer):
     """Where the input was not corrupted, it is the target of the step before."""
     config = generator_config(tokenizer)
-    encoded = encode_clips(tokenizer, stitched_clips(library.train, 16, 0), books=2)
+    encoded = encode_clips(tokenizer, stitched_clips(library.train, 16, 0), codebooks=2)
     random = np.random.default_rng(0)
     edges = torch.from_numpy(speed_edges((e.label, e.speeds) for e in encoded))
-    before, labels, paces, duration, codes = make_batch(config, edges, encoded, random)
+    before, labels, speed_bins, duration, codes = make_batch(
+        config, edges, encoded, random
+    )
     agree = (before[:, 1:] == codes[:, :-1]).float().mean()
     assert 1 - CORRUPTION * 1.5 < agree < 1.0
-    starts = (before[:, 0] == config.book_size).all(dim=-1)
+    starts = (before[:, 0] == config.codebook_size).all(dim=-1)
     assert 0 < starts.sum() < len(encoded)
     for row, sequence in zip(labels, encoded, strict=True):
         assert set(row.tolist()) == {sequence.label}
-    assert paces.shape == labels.shape
-    assert 0 <= paces.min() < paces.max() < BINS
+    assert speed_bins.shape == labels.shape
+    assert 0 <= speed_bins.min() < speed_bins.max() < BINS
     # No window is told a duration that is shorter than itself.
     assert duration.min() >= duration_bin(20 * 4 / 50)
 

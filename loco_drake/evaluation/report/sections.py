@@ -1,9 +1,9 @@
 """The tables of each part of the pipeline, for all robots that have results."""
 
 from collections.abc import Iterable
+from dataclasses import asdict
 from typing import Any
 
-from loco_drake.common.weights import load_weights
 from loco_drake.control.actor import load_actor
 from loco_drake.evaluation.report import tables
 from loco_drake.evaluation.report.content import CONTENT
@@ -20,6 +20,8 @@ from loco_drake.evaluation.report.tables import (
     number,
     robot_title,
 )
+from loco_drake.generation.generator import load_generator
+from loco_drake.generation.tokenizer import load_tokenizer
 from loco_drake.models.robots import ROBOTS, get_robot
 from loco_drake.models.shipped import policy_path, pretrained_path
 from loco_drake.motion.motion import FPS
@@ -248,12 +250,11 @@ def networks_table() -> Table:
     Raises:
         InputError: if shipped weights are damaged.
     """
-    _, tokenizer = load_weights(pretrained_path("tokenizer"), "tokenizer")
-    _, generator = load_weights(pretrained_path("generator"), "generator")
-    network = tokenizer["network"]
+    network = asdict(load_tokenizer(pretrained_path("tokenizer")).config)
+    generator = asdict(load_generator(pretrained_path("generator")).config)
     robot = get_robot(ROBOTS[0])
     policy = load_actor(policy_path(robot), robot).config
-    fields = {**network, **generator["network"], "books": network["books"]}
+    fields = {**network, **generator, "codebooks": network["codebooks"]}
     fields["hidden"] = "-".join(str(width) for width in policy.hidden)
     fields["observations"] = sum(size for _, size in policy.observation_layout)
     fields["action_scale"] = policy.action_scale
