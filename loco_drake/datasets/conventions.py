@@ -24,7 +24,6 @@ from loco_drake.datasets.recording import (
 from loco_drake.motion.gait_timing import Track, stride_period
 
 GRAVITY = 9.81
-AXES = "xyz"
 # The trunk's middle is this near to straight above the toes, as a cosine.
 UPRIGHT = 0.9
 # ... and even while an animal sits, or rears, no further from it than this.
@@ -44,6 +43,8 @@ TOES_EXCHANGED, TRUNK_EXCHANGED, BOTH_EXCHANGED = TURNED
 STANCE_PERCENTILE = 10.0
 # A ground off by more, in body sizes, is the file's and not the markers'.
 GROUND = 0.045
+# Slope of the ground in degrees, told by toes that stand this far apart, in body sizes.
+MAX_SLOPE, MIN_SPREAD = 15.0, 0.05
 # Bounds of what a body does, in its sizes: the trunk's departure from a straight line
 # within a frame, its length over the median, a toe's distance from it and depth.
 TRUNK_JUMP = 0.12
@@ -71,9 +72,11 @@ def measure(recording: Recording, body: Body, path: Path) -> Recording:
     if points.shape[1:] != (6, 3) or not np.isfinite(points).all():
         raise InputError(f"{path} lacks points of the body.")
     check_rate(recording.fps, str(path))
-    points = put_on_ground(orient(points, body, path, notes), body, notes)
+    upright = orient(points, body, path, notes)
+    points = put_on_ground(upright, body, notes)
     recording = replace(recording, points=points, notes=notes)
     check_motion(recording, body, path)
+    _check_level(upright, path)
     return recording
 
 
@@ -111,7 +114,7 @@ def orient(points: Array, body: Body, path: Path, notes: dict[str, str]) -> Arra
 
 def _turn_up(points: Array, path: Path, notes: dict[str, str]) -> Array:
     seen = points[all_seen(points)]
-    up = np.median(seen[:, :2].mean(axis=1) - seen[:, 2:].mean(axis=1), axis=0)
+    up = np.median(seen[:, :2].mean(axis=1) - np.median(seen[:, 2:], axis=1), axis=0)
     if not np.linalg.norm(up) > 0 or not _trunk_length(seen) > 0:
         raise InputError(f"{path}: the trunk has no length, or is in the ground.")
     cosines = up / np.linalg.norm(up)
@@ -125,10 +128,9 @@ def _turn_up(points: Array, path: Path, notes: dict[str, str]) -> Array:
         )
     if axis == 2 and cosines[2] > 0:
         return points
-    sign = "-" if cosines[axis] < 0 else ""
-    notes["up"] = f"{sign}{AXES[axis]} turned to z"
+    notes["up"] = "turned upright, since another axis than the format's points up"
     turned = points[..., [(axis + 1) % 3, (axis + 2) % 3, axis]]
-    return turned * (1.0, -1.0, -1.0) if sign else turned
+    return turned * (1.0, -1.0, -1.0) if cosines[axis] < 0 else turned
 
 
 def _name_toes(points: Array, notes: dict[str, str]) -> Array:
@@ -183,7 +185,7 @@ def _trunk_length(points: Array) -> float:
 
 def _height(points: Array) -> float:
     """Returns the height in m of the trunk's middle when the animal is on its feet."""
-    ground = np.percentile(points[:, 2:, 2], STANCE_PERCENTILE, axis=0).mean()
+    ground = np.median(np.percentile(points[:, 2:, 2], STANCE_PERCENTILE, axis=0))
     return float(np.percentile(points[:, :2, 2].mean(axis=1), 75) - ground)
 
 
@@ -200,6 +202,23 @@ def ground_height(points: Array) -> float:
     stance = np.percentile(points[:, 2:, 2], STANCE_PERCENTILE, axis=0)
     ground = float(min(stance[:2].mean(), stance[2:].mean()))
     return ground if abs(ground) > GROUND * _size(points) else 0.0
+
+
+def _check_level(points: Array, path: Path) -> None:
+    """Raises InputError if the toes that stand stand on a slope."""
+    toes = points[1:, 2:]
+    steps = np.linalg.norm(np.diff(points[:, 2:], axis=0), axis=-1)
+    stood = toes[steps <= np.percentile(steps, 25, axis=0)]
+    stood = (stood - stood.mean(axis=0)) / _size(points)
+    spread = np.linalg.svd(stood[:, :2], compute_uv=False)[1] / np.sqrt(len(stood))
+    if spread > MIN_SPREAD:
+        gradient = np.linalg.lstsq(stood[:, :2], stood[:, 2], rcond=None)[0]
+        slope = np.degrees(np.arctan(np.linalg.norm(gradient)))
+        if slope > MAX_SLOPE:
+            raise InputError(
+                f"{path}: the ground slopes by {slope:.0f} degrees, so that no axis of "
+                "the file points up."
+            )
 
 
 def put_on_ground(points: Array, body: Body, notes: dict[str, str]) -> Array:

@@ -38,7 +38,7 @@ CHAINS = (
 
 # The capture's one dog measures .41 m from hip to withers and stands .44 m high; its
 # strides last 1.8 to 3.6 units of time.
-BODY = Body(trunk=(0.2, 0.8), height=(0.1, 1.0), stride=(1.3, 5.0), jump=0.25)
+BODY = Body(trunk=(0.2, 0.8), height=(0.1, 1.0), stride=(1.3, 4.2), jump=0.25)
 
 
 def read_dog(

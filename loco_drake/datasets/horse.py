@@ -20,7 +20,12 @@ from scipy.interpolate import CubicSpline
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.runs import intervals
-from loco_drake.datasets.conventions import GRAVITY, orient, stride_of
+from loco_drake.datasets.conventions import (
+    GRAVITY,
+    ground_height,
+    orient,
+    stride_of,
+)
 from loco_drake.datasets.recording import (
     Array,
     Body,
@@ -110,8 +115,9 @@ def _read_raw(path: Path) -> tuple[Array, float | None]:
     if not np.isfinite(time).all():
         raise InputError(f"{path} is not {FORMAT}: its time column is incomplete.")
     step = (time[-1] - time[0]) / (len(time) - 1)
+    rate = check_rate(1 / step, str(path)) if step > 0 else 0.0
     regular = np.abs(time - (time[0] + step * np.arange(len(time)))) < TIME_TOLERANCE
-    if step <= 0 or not regular.all():
+    if not rate or not regular.all():
         line = int(np.argmin(regular)) + 2
         raise InputError(
             f"{path} is not {FORMAT}: at line {line} the time does not go on evenly "
@@ -119,7 +125,6 @@ def _read_raw(path: Path) -> tuple[Array, float | None]:
         )
     points = table[:, 1:].reshape(-1, len(MARKERS), 3)[:, 1:] / 1000
     # Whole frames per second, as far as 1 ms in the duration lets them be told.
-    rate = check_rate(1 / step, str(path))
     whole = float(round(rate))
     return points, whole if abs(whole / rate - 1) < 0.02 else rate
 
@@ -137,11 +142,10 @@ def infer_rate(points: Array) -> float | None:
     out. None if there are too few strides, or none of the rates fits.
     """
     points = points[all_seen(points)]
-    height = float(np.median(points[:, 0, 2])) if len(points) else 0.0
-    if len(points) < 8 or height <= 0:
+    if len(points) < 8:
         return None
-    frames = stride_of(points, height, strides=2)
-    if frames is None:
+    height = float(np.median(points[:, 0, 2]) - ground_height(points))
+    if (frames := stride_of(points, height, strides=2)) is None:
         return None
     forward = (points[:, 0] - points[:, 1])[:, :2]
     relative = (points[:, 2:] - points[:, :1])[..., :2]

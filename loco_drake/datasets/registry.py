@@ -168,7 +168,7 @@ def read_clip(
         raise
     except Exception as error:  # whatever a reader stumbles over in a damaged file
         raise InputError(
-            f"{path} cannot be read as a {source} recording: {type(error).__name__}."
+            f"{path} cannot be read as a recording of {source}: {type(error).__name__}."
         ) from error
     for name in MENDED & recording.notes.keys():
         _warn(f"{path.name}: {name}: {recording.notes[name]}")

@@ -20,7 +20,7 @@ FPS = 50.0
 # Of the front left hip in the trunk's frame, m.
 HALF_SIZE = (0.19, 0.104)
 FOOT_RADIUS = 0.0155
-BODY = Body(height=(0.05, 0.4), stride=(1.0, 10.0), jump=0.35, markers=False)
+BODY = Body(height=(0.05, 0.4), stride=(1.3, 9.0), jump=0.35, markers=False)
 
 # It lands within 9 frames and has settled after 20, all in the 168 runs at hand.
 SETTLED = 20

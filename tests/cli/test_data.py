@@ -4,7 +4,9 @@ import pytest
 import tyro
 
 from loco_drake.cli.data import DataInspect, DataList
+from loco_drake.cli.main import main
 from loco_drake.common.errors import InputError
+from tests.synthetic import write_dog_recording
 from tests.synthetic_horse import make_horse, write_raw_recording
 from tests.synthetic_robots import write_mpc_recording, write_solo8_recording
 
@@ -42,6 +44,19 @@ def test_inspect_of_a_file_of_another_format_leaves_no_picture(tmp_path):
     inspect = DataInspect(file=tmp_path / "horse.txt", out=tmp_path / "a.png")
     with pytest.raises(InputError, match="3 columns instead of 81"):
         inspect.run()
+    assert not (tmp_path / "a.png").exists()
+
+
+@pytest.mark.parametrize("frames", [1, 3])
+def test_inspect_of_fewer_than_four_frames_is_refused(frames, tmp_path, capsys):
+    write_dog_recording(tmp_path / "a.txt")
+    lines = (tmp_path / "a.txt").read_text().splitlines(keepends=True)
+    (tmp_path / "a.txt").write_text("".join(lines[:frames]))
+    out = ("--out", str(tmp_path / "a.png"))
+    assert main(["data", "inspect", str(tmp_path / "a.txt"), *out]) == 2
+    assert capsys.readouterr().err.endswith(
+        f"a.txt: a recording needs at least 4 frames, not {frames}.\n"
+    )
     assert not (tmp_path / "a.png").exists()
 
 

@@ -10,7 +10,7 @@ from loco_drake.models.robot_files import load_robot
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import load_motion
 from tests.robot_files import SOLO8
-from tests.synthetic import write_lying_dog
+from tests.synthetic import write_dog_recording, write_lying_dog
 from tests.synthetic_horse import make_horse, write_world_recording
 from tests.synthetic_robots import write_mpc_recording, write_solo8_recording
 
@@ -244,6 +244,20 @@ def test_rate_given_by_hand_is_taken_unless_the_strides_contradict_it(tmp_path):
         command(file, *options, "--fps", 60).run()
     with pytest.raises(InputError, match="--fps need a FILE"):
         command("--fps", 60, "--out", tmp_path).run()
+
+
+def test_folder_without_one_of_the_fifteen_gaits_says_what_is_there(tmp_path):
+    write_dog_recording(tmp_path / "dog_mann" / "a.txt", "trot")
+    rows = (
+        "dataset,file,gait,start_frame,end_frame,fps\ndog_mann, a.txt, amble,0,99,60\n"
+    )
+    (tmp_path / "segments.csv").write_text(rows)
+    options = ("--data-dir", tmp_path, "--out", tmp_path / "out")
+    with pytest.raises(InputError, match=r"none of the fifteen .* only dog-amble"):
+        command(*options).run()
+    assert not (tmp_path / "out").exists()
+    assert command(*options, "--gait", "amble").run() == 0
+    assert (tmp_path / "out" / "dog-amble-a-0-99.npz").is_file()
 
 
 def test_file_of_another_source_leaves_nothing_behind(tmp_path):

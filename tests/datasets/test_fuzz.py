@@ -75,6 +75,48 @@ def test_spoilt_file_is_refused_in_one_sentence(tmp_path, form, how):
     assert_one_sentence(error, path)
 
 
+@pytest.mark.parametrize("how", FORMATS)
+@pytest.mark.parametrize("form", ["dog", "horse", "mpc", "solo8"])
+def test_table_of_another_format_reads_the_same(tmp_path, form, how):
+    path = tmp_path / "recording"
+    source = write(form, path)
+    right = read_clip(source, path, gait="trot")
+    path.write_bytes(spoil(path.read_text(), how))
+    clip = read_clip(source, path, gait="trot")
+    np.testing.assert_array_equal(clip.toes, right.toes)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_number_damaged_anywhere_is_refused_or_does_no_harm(tmp_path, form):
+    """A digit, sign, point or exponent: no point is off by a fifth of the body."""
+    path = tmp_path / "recording"
+    source = write(form, path)
+    whole = path.read_text()
+    right = read_clip(source, path, gait="trot")
+    size = max(right.withers[0, 2], np.linalg.norm(right.withers[0] - right.hip[0]))
+    start = whole.index("\n", whole.find("Frame Time")) if form == "bvh" else 0
+    rng = np.random.default_rng(7)
+    digits = [k for k in range(start, len(whole)) if whole[k].isdigit()]
+    outcomes = {"read": 0, "refused": 0}
+    for _ in range(60):
+        k = int(rng.choice(digits))
+        new = (str(rng.integers(10)), f"{whole[k]}e{rng.integers(-3, 9)}", "-", "")
+        damaged = whole[:k] + new[int(rng.integers(4))] + whole[k + 1 :]
+        path.write_text(damaged)
+        try:
+            clip = read_clip(source, path, gait="trot")
+        except InputError:
+            outcomes["refused"] += 1
+        else:
+            assert clip.fps == right.fps
+            assert len(clip) == len(right)
+            for name in ("withers", "hip", "toes"):
+                off = np.abs(getattr(clip, name) - getattr(right, name)).max()
+                assert off < 0.2 * size, damaged[k - 20 : k + 20]
+            outcomes["read"] += 1
+    assert min(outcomes.values()) > 3
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_files_cut_or_changed_anywhere_are_read_or_refused(tmp_path, form):
     """Cut, a byte replaced, a block left out or doubled: a clip, or one sentence."""
