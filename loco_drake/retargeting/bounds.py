@@ -43,6 +43,8 @@ BOUNDS = {
     "scale": Bound("scale", 0.1, 3.0),
     # 1; a dog that sits or lies for a part is not all motion.
     "on_feet_share": Bound("frames on its feet", 0.95, inf, " %", 100),
+    # .55 (Solo8's crawl) to 1.18 (its stilt): bodies of one size, whatever they do.
+    "trunk_height_ratio": Bound("trunk height over stance height", 0.45, 1.35),
     # .954 (a dog that spins crosses its legs); a wild gallop crosses front and rear.
     "toes_in_place_share": Bound("toes in their place", 0.75, inf, " %", 100),
     # 7 mm, of a dog that turns: left and right toes are not exchanged.

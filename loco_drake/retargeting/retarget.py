@@ -3,6 +3,8 @@
 import time
 from dataclasses import asdict, dataclass, replace
 
+import numpy as np
+
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion import quality
 from loco_drake.motion.gaits import GaitLabel
@@ -47,6 +49,8 @@ class RetargetReport:
         on_feet_share: share of the recording's frames in which the animal is on its
             feet; None where the source's configuration says how high it stands.
         on_feet_frames: those frames, in the recording's numbers, such as "240-420".
+        trunk_height_ratio: median height of the recording's trunk over the stance
+            height that the scale is of.
         toes_in_place_share: share of the frames in which a toe is on its own side of
             the trunk, and a front toe ahead of the rear one, of the worst toe.
         source_track_m: how far left of the right toes the recording's left ones are.
@@ -68,6 +72,7 @@ class RetargetReport:
     mirrored: bool
     on_feet_share: float | None
     on_feet_frames: str | None
+    trunk_height_ratio: float
     toes_in_place_share: float
     source_track_m: float
     unsolved_frames: int
@@ -136,6 +141,9 @@ def retarget_clip(
         mirrored=variant.mirror,
         on_feet_share=None if standing is None else float(standing.mean()),
         on_feet_frames=None if standing is None else frames_on_feet(clip, standing),
+        trunk_height_ratio=float(
+            np.median((clip.withers + clip.hip)[:, 2]) / 2 / height
+        ),
         toes_in_place_share=quality.toes_in_place_share(joints, robot),
         source_track_m=track_width(clip),
         unsolved_frames=int((~solved).sum()),

@@ -14,6 +14,7 @@ from loco_drake.retargeting.bounds import BOUNDS, outside_bounds
 from loco_drake.retargeting.retarget import retarget_clip
 from tests.robot_files import SOLO8
 from tests.synthetic import write_dog_recording
+from tests.synthetic_robots import write_mpc_recording
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +81,19 @@ def sits_at_first(clip):
     hip, toes = clip.hip.copy(), clip.toes.copy()
     hip[:60, 2] = 0.08
     return replace(clip, hip=hip, toes=toes)
+
+
+def test_body_of_another_size_than_its_source_has_is_warned_of(tmp_path):
+    """The MPC's robot twice as large, though its stance height is given as .2 m."""
+    write_mpc_recording(tmp_path / "mpc.txt", "trot")
+    clip = read_clip("mpc", tmp_path / "mpc.txt", gait="trot")
+    assert retarget_clip(clip, get_robot("go2"))[1].warnings == ()
+    arrays = {key: 2 * getattr(clip, key) for key in ("withers", "hip", "toes")}
+    report = retarget_clip(replace(clip, **arrays), get_robot("go2"))[1]
+    ratio = report.trunk_height_ratio
+    sentence = f"trunk height over stance height {ratio:.3g}, not 0.45 to 1.35"
+    assert 1.7 < ratio < 2.1
+    assert sentence in report.warnings
 
 
 @pytest.mark.parametrize(
