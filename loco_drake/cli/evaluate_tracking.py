@@ -10,7 +10,7 @@ from rich.progress import Progress
 from loco_drake.cli.evaluation import Evaluation
 from loco_drake.cli.output import print_figures
 from loco_drake.common.errors import check_at_least, check_choice
-from loco_drake.motion.gaits import parse_label
+from loco_drake.motion.gaits import any_label, parse_label
 from loco_drake.tracking.randomization import RandomizationConfig
 
 if TYPE_CHECKING:
@@ -120,7 +120,8 @@ class EvaluateTracking(Evaluation):
         robot = get_robot(name)
         weights = policy_path(robot, self.policy)
         trained = load_actor(weights, robot).config.labels
-        labels = [str(parse_label(label)) for label in self.labels or trained]
+        parse = any_label if self.reference == "retargeted" else parse_label
+        labels = [str(parse(label)) for label in self.labels or trained]
         plant = PlantConfig(
             contact=self.contact,
             time_step=self.time_step,

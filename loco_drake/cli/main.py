@@ -11,7 +11,8 @@ from rich.table import Table
 
 from loco_drake import __version__
 from loco_drake.common.determinism import use_one_thread
-from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.errors import InputError, check_choice, one_line
+from loco_drake.common.files import check_writable
 
 # Command: module, class, what it does. A module is imported only when its command is
 # asked for: --help should not wait for torch and Drake.
@@ -58,6 +59,9 @@ _COMMANDS = {
     "report": ("report", "Report", "one page of all results, beside the paper's"),
 }
 _HELP = ("-h", "--help")
+# Options that name what is written; it is found out before the work whether it can be.
+_OUTPUTS = ("json", "html", "out", "figures")
+_ONE_FILE = ("report", "export", "data inspect")  # whose --out is no folder
 # What Drake needs of a bare Debian or Ubuntu.
 _LIBRARIES = "libx11-6 libsm6 libglib2.0-0"
 
@@ -91,6 +95,9 @@ def main(arguments: list[str] | None = None) -> int:
         logging.getLogger("drake").addFilter(_is_error)
         prog = f"loco-drake {name}"
         parsed: Any = tyro.cli(command, prog=prog, args=rest)
+        for option in _OUTPUTS:
+            into = option == "figures" or (option == "out" and name not in _ONE_FILE)
+            check_writable(getattr(parsed, option, None), folder=into)
         if getattr(parsed, "resume", False):
             from loco_drake.cli.training import parse_resumed
 
@@ -112,7 +119,8 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
     except OSError as error:
         # A full disk, a folder that may not be written to: not this program's fault.
-        print(f"loco-drake: {error}", file=sys.stderr)
+        reason = f"{error.strerror}: {error.filename}" if error.filename else error
+        print(f"loco-drake: {one_line(str(reason))}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("loco-drake: interrupted", file=sys.stderr)

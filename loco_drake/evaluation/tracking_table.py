@@ -36,7 +36,7 @@ from loco_drake.evaluation.tracking import (
     tracking_metrics,
 )
 from loco_drake.models.robots import get_robot
-from loco_drake.motion.gaits import parse_label
+from loco_drake.motion.gaits import any_label
 from loco_drake.retargeting.batch import SegmentRetargeter
 from loco_drake.systems.scenario import PlanReference, Scenario
 from loco_drake.tracking.randomization import RandomizationConfig
@@ -103,7 +103,7 @@ class _Runner:
 
     def __call__(self, trial: Trial) -> Episode:
         duration = trial.duration
-        random = np.random.default_rng((trial.seed, parse_label(trial.label).index))
+        random = np.random.default_rng((trial.seed, any_label(trial.label).index))
         domain = self._randomization.draw(self._robot, random, 0.0, duration)
         if trial.segment is None:
             self._recorder.start(gait=trial.label, seed=trial.seed, domain=domain)

@@ -71,6 +71,16 @@ ONE_HOT.setflags(write=False)
 ONE_HOT_SIZE = ONE_HOT.shape[1]
 
 
+def any_label(text: str) -> GaitLabel:
+    """Returns the label written as ``text``, of any source and gait.
+
+    Raises:
+        InputError: if it is not two names with a hyphen between.
+    """
+    source, _, gait = text.partition("-")
+    return GaitLabel(source, gait)
+
+
 def parse_label(text: str) -> GaitLabel:
     """Returns the label written as ``text``.
 

@@ -14,7 +14,7 @@ from loco_drake.control.actor import PRIVILEGED, Actor
 from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.datasets.registry import DATASETS
 from loco_drake.models.robots import Robot
-from loco_drake.motion.gaits import parse_label
+from loco_drake.motion.gaits import any_label
 
 SET_POINTS = (
     "every 1 / rate s: q_d = q + (kd v + tau) / kp + action_scale * action, v_d = 0; "
@@ -36,9 +36,11 @@ def policy_metadata(actor: Actor, robot: Robot) -> dict[str, str]:
     - licence: of the recordings that the policy was learned from
     """
     config = actor.config
-    sources = dict.fromkeys(parse_label(label).source for label in config.labels)
+    sources = dict.fromkeys(any_label(label).source for label in config.labels)
     licences = "; ".join(
         f"{source}: {DATASETS[source].licence}, {DATASETS[source].attribution}"
+        if source in DATASETS
+        else f"{source}: not known"
         for source in sources
     )
     values: dict[str, Any] = {

@@ -1,7 +1,9 @@
 """The contract of the command line: what it refuses, how, and with which status."""
 
 import json
+import os
 import re
+import stat
 
 import numpy as np
 import pytest
@@ -255,9 +257,44 @@ def test_a_file_that_cannot_be_written_is_status_1(made_data, tmp_path, capsys):
     (tmp_path / "file").write_text("")
     target = str(tmp_path / "file" / "a.json")
     assert main(["data", "list", "--data-dir", str(made_data), "--json", target]) == 1
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert error.startswith("loco-drake: ")
+    printed = capsys.readouterr()
+    assert printed.out == ""  # found out before the work
+    assert printed.err == f"loco-drake: Not a folder: {tmp_path / 'file'}\n"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "data list --json FOLDER",
+        "simulate --html FOLDER",
+        "export --out FOLDER",
+        "report --out FOLDER",
+    ],
+)
+def test_a_folder_where_a_file_is_to_be_written_is_status_2(line, tmp_path, capsys):
+    assert main(line.replace("FOLDER", str(tmp_path)).split()) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "is a folder, not a file to be written" in printed.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("option", ["--out", "--json"])
+def test_a_file_where_a_folder_is_needed_is_status_1_before_the_work(
+    option, tmp_path, capsys
+):
+    (tmp_path / "file").write_text("kept")
+    arguments = f"generate {option} {tmp_path / 'file' / 'a'}"
+    assert main(arguments.split()) == 1
+    assert "Not a folder" in capsys.readouterr().err
+    assert (tmp_path / "file").read_text() == "kept"
+
+
+def test_figures_can_go_to_a_device(made_data, capsys):
+    """As root, replacing /dev/null by a file would break the machine."""
+    device = "/dev/null"
+    assert main(["data", "list", "--data-dir", str(made_data), "--json", device]) == 0
+    assert stat.S_ISCHR(os.stat(device).st_mode)
 
 
 def test_ctrl_c_is_status_1_without_traceback(monkeypatch, tmp_path, capsys):
