@@ -88,7 +88,7 @@ WRONG = {
     "simulate --duration nan": DURATION,
     "simulate --duration inf": DURATION,
     "simulate --duration 1e9": DURATION,
-    "simulate --seed -1": "The seed must be 0 or more, not -1",
+    "simulate --seed -1": "seed must be a number from 0 to .*-1",
     "simulate --contact tamsi": "'tamsi'; the choices are similar, lagged, sap, cenic",
     "simulate --time-step 0": "time_step must be above 0, not 0.0",
     "simulate --friction nan": "friction must be above 0, not nan",
