@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from loco_drake.datasets.segments import Segment, read_segments
-from loco_drake.evaluation.gait_fidelity import GaitFidelity
 from loco_drake.evaluation.retargeting import (
     ClipScore,
     FailedClip,
+    GaitFidelity,
     figures,
     score_segments,
     summarize,
@@ -30,6 +30,12 @@ def score(gait="trot", name="a", frames=100, fidelity=None, slips=(), **changes)
         "scale": 1.0,
         "time_scale": 1.0,
         "mirrored": False,
+        "on_feet_share": None,
+        "on_feet_frames": None,
+        "trunk_height_ratio": 1.0,
+        "toes_in_place_share": 1.0,
+        "source_track_m": 0.1,
+        "unsolved_frames": 0,
     }
     return ClipScore(
         segment=Segment("dog", Path(f"{name}.txt"), gait, 0, 100, 60.0),

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from loco_drake.evaluation.gait_fidelity import NO_RHYTHM, gait_fidelity, timing_errors
+from loco_drake.evaluation.retargeting import NO_RHYTHM, gait_fidelity, timing_errors
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gait_timing import (
     GaitTiming,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from loco_drake.evaluation.gait_fidelity import gait_fidelity
+from loco_drake.evaluation.retargeting import gait_fidelity
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gait_timing import clip_track, motion_track
 from loco_drake.motion.gaits import LABELS
