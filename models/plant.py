@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
 from pydrake.geometry import SceneGraph, SceneGraphConfig
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import (
@@ -15,7 +14,7 @@ from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder
 
-from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.errors import check_choice, check_number
 
 from .ground import AddGround
 from .robots import AddRobotModel, Robot
@@ -44,10 +43,12 @@ class PlantConfig:
     def check(self) -> None:
         """Raises InputError unless every field is sound."""
         check_choice("contact", self.contact, CONTACTS)
-        for name in ("time_step", "accuracy", "friction"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise InputError(f"The plant's {name} must be above 0, not {value}.")
+        for name, low, high in (
+            ("time_step", 1e-5, 0.05),
+            ("accuracy", 1e-9, 0.1),
+            ("friction", 1e-6, 1e3),
+        ):
+            check_number(f"The plant's {name}", getattr(self, name), low, high)
 
 
 def AddRobotPlant(

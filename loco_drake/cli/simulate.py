@@ -3,9 +3,8 @@
 import sys
 import time
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -24,71 +23,81 @@ if TYPE_CHECKING:
 _MAX_DURATION = 3600.0
 
 
+def _default(value: str, metavar: str) -> Any:
+    """Says what an option is that was not given and that a scenario may hold."""
+    hint = f"(default: {value}, or the scenario's)"
+    return tyro.conf.arg(metavar=metavar, help_behavior_hint=hint)
+
+
 @dataclass(kw_only=True)
 class Simulate:
     """Simulate a robot that does a gait, written by the generator, in Drake."""
 
-    robot: str = "go2"
+    robot: Annotated[str | None, _default("go2", "STR")] = None
     """Robot: go2 or a1."""
-    gait: str = "dog-trot"
+    gait: Annotated[str | None, _default("dog-trot", "STR")] = None
     """Gait label, source-gait, such as dog-trot; or several, the later ones with the
     time in s at which they begin: dog-pace,dog-trot@3. Ignored with a Motion file."""
-    duration: float = 10.0
+    duration: Annotated[float | None, _default("10.0", "FLOAT")] = None
     """Seconds to simulate; of a Motion file at most its length."""
-    seed: int = 0
+    seed: Annotated[int | None, _default("0", "INT")] = None
     """What the motion is drawn with."""
-    reference: str = "gpt"
+    reference: Annotated[str | None, _default("gpt", "STR")] = None
     """gpt: written by the generator while the simulation runs; or a Motion file."""
-    policy: Path | None = None
-    """Weights of the policy, or the name of another shipped one, such as randomized;
-    default: the robot's main one."""
+    policy: Annotated[Path | None, _default("the robot's main one", "PATH")] = None
+    """Weights of the policy, or the name of another shipped one, such as randomized."""
     meshcat: bool = True
     """Show the simulation live in the browser, in real time at best."""
     port: int | None = None
     """Port of Meshcat; default, or if it is in use: a free one."""
     html: Path | None = None
     """Save the replay as one HTML page."""
-    contact: str = "similar"
+    contact: Annotated[str | None, _default("similar", "STR")] = None
     """Contact solver: similar, lagged, sap or cenic."""
-    time_step: float = 0.01
+    time_step: Annotated[float | None, _default("0.01", "FLOAT")] = None
     """Step of the physics, s."""
-    friction: float = 0.8
+    friction: Annotated[float | None, _default("0.8", "FLOAT")] = None
     """Friction of the ground."""
+    scenario: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
+    """A scenario in YAML, loco_drake.systems.scenario.Scenario; other options win."""
+    overlay: Annotated[str | None, tyro.conf.arg(metavar="TEXT")] = None
+    """YAML text that overrides fields of the scenario: "plant: {accuracy: 1.0e-4}"."""
     json: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
     """Write the figures to a file."""
 
     def run(self) -> int:
         """Simulates, prints and writes; returns the exit status."""
         from loco_drake.control.plan import PLAN_DT
+        from loco_drake.control.state import POSITION
         from loco_drake.evaluation.replay import FRAMES_PER_SECOND, frame
         from loco_drake.evaluation.rollout import Recorder
         from loco_drake.evaluation.tracking import tracking_metrics
 
-        motion = self._check()
+        scenario, duration, motion = self._read()
         meshcat = self._start_meshcat()
-        scenario = self._scenario(visual=meshcat is not None)
+        scenario.plant.visual = meshcat is not None
         recorder = Recorder(scenario, meshcat)
         recorder.start()
         if meshcat is not None:
             meshcat.StartRecording(frames_per_second=FRAMES_PER_SECOND)
-        duration = self.duration
-        if motion is not None:
-            duration = min(duration, motion.duration)
         # The first evaluation of the networks sets up torch.
         recorder.diagram.GetOutputPort("action").Eval(recorder.context)
         start = time.perf_counter()
+        # Unless Drake does it: outside AdvanceTo, so that the speed printed is true.
+        waits = self.meshcat and scenario.simulator.target_realtime_rate == 0
 
-        def pace(now: float) -> None:
+        def keep_pace(now: float) -> None:
             ahead = now - (time.perf_counter() - start)
-            if self.meshcat and ahead > 0:
+            if waits and ahead > 0:
                 time.sleep(ahead)
 
-        rollout, wall = recorder.run(duration, pace)
+        rollout, wall = recorder.run(duration, keep_pace)
         simulated = (len(rollout.state) - 1) * PLAN_DT
+        reference: Any = scenario.reference
         figures = {
-            "robot": self.robot,
-            "gait": self.gait if motion is None else str(motion.label),
-            "seed": self.seed,
+            "robot": scenario.robot,
+            "gait": reference.gait if motion is None else str(motion.label),
+            "seed": reference.seed if motion is None else self.seed or 0,
             "duration_s": duration,
             "simulated_s": simulated,
             "fell": rollout.fell,
@@ -98,7 +107,7 @@ class Simulate:
         if meshcat is not None:
             meshcat.StopRecording()
             meshcat.PublishRecording()
-            frame(meshcat, rollout.state[:, 4:7])
+            frame(meshcat, rollout.state[POSITION])
             if self.html is not None:
                 with atomic_path(self.html) as temporary:
                     temporary.write_text(meshcat.StaticHtml())
@@ -106,61 +115,70 @@ class Simulate:
         write_json(self.json, figures)
         return 0
 
-    def _check(self) -> Motion | None:
-        """Returns the Motion file to follow, if any; raises InputError if amiss."""
+    def _read(self) -> "tuple[Scenario, float, Motion | None]":
+        """Returns what to simulate, for how long, and the motion to follow, if any.
+
+        Raises:
+            InputError: if an option or a field of the scenario is amiss.
+        """
         from loco_drake.control.plan import PLAN_DT
-        from loco_drake.models.robots import get_robot
-
-        get_robot(self.robot)
-        if not (isfinite(self.duration) and 0 < self.duration <= _MAX_DURATION):
-            raise InputError(
-                f"The duration must be above 0 s and at most {_MAX_DURATION:g} s, "
-                f"not {self.duration}."
-            )
-        if self.duration < PLAN_DT:
-            raise InputError(f"The duration must be at least {PLAN_DT} s.")
-        if self.reference == "gpt":
-            parse_schedule(self.gait).check_ends_by(self.duration)
-            return None
-        if not Path(self.reference).is_file():
-            raise InputError(
-                f"The reference must be gpt or a Motion file, and there is no file "
-                f"{self.reference!r}."
-            )
-        motion = load_motion(Path(self.reference))
-        if motion.robot != self.robot:
-            raise InputError(
-                f"{self.reference} is a motion of {motion.robot}, not of {self.robot}."
-            )
-        return motion
-
-    def _scenario(self, *, visual: bool) -> "Scenario":
-        from loco_drake.models.plant import PlantConfig
         from loco_drake.systems.scenario import (
             GeneratedReference,
+            LoadScenario,
             MotionReference,
-            Scenario,
             TrainedPolicy,
         )
 
-        reference: GeneratedReference | MotionReference
+        scenario = LoadScenario(filename=self.scenario, overlay=self.overlay)
+        _override(scenario, robot=self.robot)
+        names = ("contact", "time_step", "friction")
+        _override(scenario.plant, **{name: getattr(self, name) for name in names})
+        if self.policy is not None:
+            scenario.policy = TrainedPolicy(weights=self.policy)
         if self.reference == "gpt":
-            reference = GeneratedReference(
-                gait=self.gait, seed=self.seed, duration=self.duration
-            )
+            if not isinstance(scenario.reference, GeneratedReference):
+                scenario.reference = GeneratedReference()
+        elif self.reference is not None:
+            if not Path(self.reference).is_file():
+                raise InputError(
+                    f"The reference must be gpt or a Motion file, and there is no file "
+                    f"{self.reference!r}."
+                )
+            scenario.reference = MotionReference(path=Path(self.reference))
+        reference = scenario.reference
+        if isinstance(reference, GeneratedReference):
+            given = {"gait": self.gait, "seed": self.seed, "duration": self.duration}
+            _override(reference, **given)
+            duration = reference.duration
         else:
-            reference = MotionReference(path=Path(self.reference))
-        return Scenario(
-            robot=self.robot,
-            plant=PlantConfig(
-                contact=self.contact,
-                time_step=self.time_step,
-                friction=self.friction,
-                visual=visual,
-            ),
-            reference=reference,
-            policy=TrainedPolicy(weights=self.policy),
-        )
+            duration = 10.0 if self.duration is None else self.duration
+        if not PLAN_DT <= duration <= _MAX_DURATION:
+            raise InputError(
+                f"The duration must be at least {PLAN_DT} s and at most "
+                f"{_MAX_DURATION:g} s, not {duration}."
+            )
+        scenario.check()
+        if not isinstance(scenario.policy, TrainedPolicy):
+            raise InputError("The policy of a scenario to simulate must be trained.")
+        if isinstance(reference, GeneratedReference):
+            parse_schedule(reference.gait).check_ends_by(duration)
+            return scenario, duration, None
+        if not isinstance(reference, MotionReference):
+            raise InputError(
+                "The reference of a scenario to simulate must be generated or a Motion."
+            )
+        if self.reference is None and (self.gait, self.seed) != (None, None):
+            raise InputError(
+                "--gait and --seed are of generated motion, and the scenario's is a "
+                "file: add --reference gpt."
+            )
+        motion = load_motion(reference.path)
+        if motion.robot != scenario.robot:
+            raise InputError(
+                f"{reference.path} is a motion of {motion.robot}, not of "
+                f"{scenario.robot}."
+            )
+        return scenario, min(duration, motion.duration), motion
 
     def _start_meshcat(self) -> "Meshcat | None":
         from loco_drake.evaluation.replay import dress
@@ -172,6 +190,13 @@ class Simulate:
         if self.meshcat:
             print(f"Meshcat: {meshcat.web_url()}", flush=True)
         return meshcat
+
+
+def _override(config: Any, **given: Any) -> None:
+    """Sets the fields that are not None."""
+    for name, value in given.items():
+        if value is not None:
+            setattr(config, name, value)
 
 
 def _open_meshcat(port: int | None) -> "Meshcat":

@@ -88,4 +88,5 @@ def check_number(what: str, value: Any, low: float, high: float = inf) -> None:
     if not (number and isfinite(value) and low <= value <= high):
         most = "" if high == inf else f" to {high:g}"
         bounds = f"from {low:g}{most}" if most else f"of at least {low:g}"
-        raise InputError(f"{what} must be a number {bounds}, not {quoted(value)}.")
+        given = value if number else quoted(value)
+        raise InputError(f"{what} must be a number {bounds}, not {given}.")

@@ -57,7 +57,7 @@ def test_json_says_what_the_worlds_were_drawn_from(tmp_path, capsys):
         ("--seeds 0", "--seeds must be 1 or more"),
         ("--duration nan", "duration must be above 0"),
         ("--contact glue", "choices are similar, lagged, sap, cenic"),
-        ("--time-step 0", "time_step must be above 0"),
+        ("--time-step 0", "time_step must be a number from 1e-05 to 0.05"),
         ("--workers 0", "--workers must be 1 or more"),
         ("--policy nowhere.safetensors", "nowhere.safetensors"),
         ("--reference retargeted --data-dir nowhere", "no data folder"),

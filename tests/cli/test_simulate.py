@@ -142,3 +142,59 @@ def test_shipped_weights_carry_the_robots_for_ten_seconds(gait, robot, tmp_path)
     assert figures["joint_rmse_rad"] <= 0.08
     assert figures["base_position_rmse_m"] <= 0.08
     assert figures["stretch"] <= 1.1
+
+
+SCENARIO = """
+robot: go2
+reference: !GeneratedReference {gait: dog-pace, seed: 5, duration: 0.3}
+plant: {friction: 0.6}
+"""
+
+
+def test_a_scenario_file_an_overlay_and_options_that_win(weights, tmp_path):
+    """The figures are those of the same run, asked for by options."""
+    path = tmp_path / "scenario.yaml"
+    path.write_text(SCENARIO)
+    line = ("--no-meshcat", "--policy", weights / "calm.safetensors")
+    options = ("--gait", "dog-pace", "--duration", 0.3, "--friction", 0.5, "--seed", 6)
+    expected = simulate(tmp_path, *line, *options)
+    overlay = ("--overlay", "plant: {friction: 0.5}", "--seed", 6)
+    found = simulate(tmp_path, *line, "--scenario", path, *overlay)
+    for figures in (expected, found):
+        del figures["real_time_factor"]
+    assert found == expected
+    assert (found["gait"], found["seed"]) == ("dog-pace", 6)
+    # An option of the usual value wins too.
+    shorter = simulate(tmp_path, *line, "--scenario", path, "--gait", "dog-trot")
+    assert (shorter["gait"], shorter["simulated_s"]) == ("dog-trot", 0.3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--scenario", "none.yaml"], "no scenario file 'none.yaml'"),
+        (["--scenario", "."], "no scenario file"),
+        (["--overlay", "robto: a1"], "cannot be read"),
+        (["--overlay", "smoother: {chunk: 0.01}"], "smoother's chunk must be"),
+        (["--overlay", "policy: !ExternalAction {}"], "must be trained"),
+        (["--overlay", "reference: !PlanReference {}"], "generated or a Motion"),
+        (["--overlay", "reference: !MotionReference {}"], ""),
+        (["--overlay", "robot: spot", "--robot", "dog"], "Unknown robot"),
+        (["--overlay", "reference: !GeneratedReference {duration: 1e9}"], "duration"),
+    ],
+)
+def test_a_scenario_that_cannot_be_simulated_is_one_sentence(
+    arguments, message, capsys
+):
+    assert main(["simulate", "--no-meshcat", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert message in error
+
+
+def test_options_of_generated_motion_do_not_go_with_a_scenarios_file(tmp_path, capsys):
+    save_motion(synthetic_motion("dog-pace", seconds=1.0), tmp_path / "a.npz")
+    overlay = f"reference: !MotionReference {{path: {tmp_path / 'a.npz'}}}"
+    line = ["simulate", "--no-meshcat", "--overlay", overlay, "--gait", "dog-trot"]
+    assert main(line) == 2
+    assert "add --reference gpt" in capsys.readouterr().err

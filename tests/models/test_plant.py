@@ -236,8 +236,14 @@ def test_config_loads_from_yaml():
     ("config", "message"),
     [
         (PlantConfig(contact="tamsi"), "choices are similar, lagged, sap, cenic"),
-        (PlantConfig(time_step=0.0), "time_step must be above 0, not 0.0"),
-        (PlantConfig(friction=float("nan")), "friction must be above 0, not nan"),
+        (
+            PlantConfig(time_step=0.0),
+            "time_step must be a number from 1e-05 .*0.0",
+        ),
+        (
+            PlantConfig(friction=float("nan")),
+            "friction must be a number .* not nan",
+        ),
     ],
 )
 def test_bad_config_is_refused(config, message):

@@ -16,7 +16,6 @@ from loco_drake.systems.scenario import (
     ExternalAction,
     ExternalTargets,
     GeneratedReference,
-    LoadScenario,
     MotionReference,
     PlanReference,
     Scenario,
@@ -177,38 +176,3 @@ def test_a_policy_is_a_file_or_the_name_of_a_shipped_one(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("randomized").touch()
     assert policy_path(robot, Path("randomized")) == Path("randomized")
-
-
-def test_a_scenario_is_read_from_yaml(tmp_path):
-    text = """
-    robot: a1
-    plant: {time_step: 0.005}
-    reference: !GeneratedReference {gait: dog-pace, seed: 7}
-    policy: !ExternalAction {}
-    smoother: null
-    """
-    scenario = LoadScenario(data=text, overlay="plant: {friction: 0.5}")
-    assert scenario.robot == "a1"
-    assert scenario.plant.time_step == 0.005
-    assert scenario.plant.friction == 0.5
-    assert scenario.plant.contact == "similar"
-    assert scenario.reference == GeneratedReference(gait="dog-pace", seed=7)
-    assert scenario.policy == ExternalAction()
-    assert scenario.smoother is None
-    path = tmp_path / "scenario.yaml"
-    path.write_text(text)
-    assert LoadScenario(filename=path).robot == "a1"
-
-
-@pytest.mark.parametrize(
-    "text", ["robto: go2", "plant: {time_step: fast}", "reference: !Dance {}", "["]
-)
-def test_a_scenario_with_a_mistake_is_one_sentence(text):
-    with pytest.raises(InputError, match="cannot be read") as error:
-        LoadScenario(data=text)
-    assert "\n" not in str(error.value)
-
-
-def test_a_missing_scenario_file_is_named(tmp_path):
-    with pytest.raises(InputError, match="no scenario file"):
-        LoadScenario(filename=tmp_path / "none.yaml")
