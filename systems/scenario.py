@@ -8,7 +8,11 @@ from pydrake.common.yaml import yaml_load_typed
 from pydrake.systems.analysis import SimulatorConfig
 from pydrake.visualization import VisualizationConfig
 
-from loco_drake.common.errors import InputError, check_choice, check_number
+from loco_drake.common.errors import (
+    InputError,
+    check_choice,
+    check_number,
+)
 from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS
@@ -41,12 +45,12 @@ class GeneratedReference:
     def check(self) -> None:
         """Raises InputError unless every field is sound."""
         parse_schedule(str(self.gait))
-        check_number("The reference's seed", self.seed, 0, 2**63 - 1)
-        if not isinstance(self.seed, int | np.integer):
-            raise InputError(f"The reference's seed must be whole, not {self.seed}.")
-        check_number("The reference's duration", self.duration, PLAN_DT)
-        check_number("The reference's temperature", self.temperature, 0.0)
-        check_number("The reference's top_p", self.top_p, 1e-6, 1.0)
+        whole = isinstance(self.seed, int | np.integer)
+        if not (whole and 0 <= self.seed < 2**63):
+            raise InputError(f"The seed must be 0 or more, not {self.seed!s:.40}.")
+        check_number("The duration", self.duration, PLAN_DT)
+        check_number("The temperature", self.temperature, 0.0)
+        check_number("top_p", self.top_p, 1e-6, 1.0)
 
 
 @dataclass(kw_only=True)

@@ -24,8 +24,8 @@ _MAX_DURATION = 3600.0
 
 
 def _default(value: str, metavar: str) -> Any:
-    """Says what an option is that was not given and that a scenario may hold."""
-    hint = f"(default: {value}, or the scenario's)"
+    """Names the default of an option that, not given, may be a scenario's."""
+    hint = f"(default: {value})"
     return tyro.conf.arg(metavar=metavar, help_behavior_hint=hint)
 
 
@@ -59,7 +59,8 @@ class Simulate:
     friction: Annotated[float | None, _default("0.8", "FLOAT")] = None
     """Friction of the ground."""
     scenario: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """A scenario in YAML, loco_drake.systems.scenario.Scenario; other options win."""
+    """A scenario in YAML, see loco_drake.systems.scenario: its fields are the defaults
+    of the options above, which win where they are given."""
     overlay: Annotated[str | None, tyro.conf.arg(metavar="TEXT")] = None
     """YAML text that overrides fields of the scenario: "plant: {accuracy: 1.0e-4}"."""
     json: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
@@ -154,8 +155,8 @@ class Simulate:
             duration = 10.0 if self.duration is None else self.duration
         if not PLAN_DT <= duration <= _MAX_DURATION:
             raise InputError(
-                f"The duration must be at least {PLAN_DT} s and at most "
-                f"{_MAX_DURATION:g} s, not {duration}."
+                f"The duration must be above 0 s, at least a sample of {PLAN_DT} s, "
+                f"and at most {_MAX_DURATION:g} s, not {duration}."
             )
         scenario.check()
         if not isinstance(scenario.policy, TrainedPolicy):

@@ -194,7 +194,7 @@ def test_a_cloned_context_writes_the_same(go2, model):
         ({"gait": "horse-walk"}, "not trained on horse-walk"),
         ({"gait": "dog-trot,horse-walk@30"}, "not trained on horse-walk"),
         ({"gait": "dog-trot,dog-pace@3,dog-trot@2"}, "rising times"),
-        ({"seed": -1}, "seed must be a number from 0"),
+        ({"seed": -1}, "seed must be 0 or more"),
         ({"duration": 0.0}, "duration must be a number of at least 0.02"),
         ({"duration": float("nan")}, "duration must be a number of at least 0.02"),
         ({"temperature": -1.0}, "temperature"),

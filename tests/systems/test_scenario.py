@@ -56,7 +56,7 @@ BAD = {
     "reference: !Dance {}": "cannot be read",
     "reference: !GeneratedReference {gait: waltz}": "dog-pace, dog-trot",
     "reference: !GeneratedReference {seed: 1.5}": "cannot be read",
-    "reference: !GeneratedReference {seed: -1}": "seed must be a number from 0",
+    "reference: !GeneratedReference {seed: -1}": "seed must be 0 or more",
     "reference: !GeneratedReference {duration: .inf}": "duration must be a number",
     "reference: !GeneratedReference {top_p: 2}": "top_p must be a number",
     "reference: !GeneratedReference {temperature: -1}": "temperature must be",
