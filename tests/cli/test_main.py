@@ -88,7 +88,7 @@ WRONG = {
     "simulate --duration nan": DURATION,
     "simulate --duration inf": DURATION,
     "simulate --duration 1e9": DURATION,
-    "simulate --seed -1": "seed must be a number from 0 to .*-1",
+    "simulate --seed -1": "The seed must be 0 or more, not -1",
     "simulate --contact tamsi": "'tamsi'; the choices are similar, lagged, sap, cenic",
     "simulate --time-step 0": "time_step must be a number from 1e-05 to 0.05, not",
     "simulate --friction nan": "friction must be a number from 1e-06 to 1000, not",
