@@ -52,6 +52,8 @@ def retarget(
     motion, report = retarget_clip(clip, model)
     moved, slip = 1000 * report.correction_rmse_m, report.stance_slip_median_mps
     print(f"{len(motion)} frames; toes moved by {moved:.0f} mm, slip {slip:.3f} m/s")
+    for warning in report.warnings:
+        print(f"Warning: {warning}")
     meshcat = Meshcat()
     plan = plan_from_motion(model, motion)
     simulator = Simulator(make_playback(model, plan, meshcat))
