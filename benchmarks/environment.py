@@ -38,9 +38,8 @@ from loco_drake.models.plant import AddRobotPlant, ConfigureSimulator, PlantConf
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
 from loco_drake.tracking.batch import TrackingBatch
-from loco_drake.tracking.environment_config import EnvironmentConfig
+from loco_drake.tracking.config import EnvironmentConfig, TerminationConfig
 from loco_drake.tracking.randomization import STANDARD, RandomizationConfig
-from loco_drake.tracking.terminations import TerminationConfig, has_strayed
 
 ROBOT = "go2"
 ROBOTS = 16  # in a worker
@@ -177,7 +176,7 @@ def parts(plan: Plan, calls: int = 100) -> dict[str, float]:
         "observe": lambda: observe(robot, shown, state, action),
         "reward_terms": lambda: reward_terms(robot, wanted, toes, state),
         "has_fallen": lambda: has_fallen(robot, state[:, :19]),
-        "has_strayed": lambda: has_strayed(termination, state, wanted),
+        "exceeded": lambda: termination.exceeded(state, wanted),
     }
     seconds = {}
     for name, function in functions.items():

@@ -25,10 +25,9 @@ from environment import ROBOT, ROBOTS, make_plans
 
 from loco_drake.common.files import atomic_path
 from loco_drake.control.plan import Plan
-from loco_drake.tracking.environment_config import EnvironmentConfig
-from loco_drake.tracking.ppo import PpoConfig
+from loco_drake.tracking.config import EnvironmentConfig, PpoConfig, TrainingConfig
 from loco_drake.tracking.sampler import PlanSampler
-from loco_drake.tracking.train import Progress, TrainingConfig, train_tracker
+from loco_drake.tracking.train import Progress, train_tracker
 from loco_drake.tracking.workers import WorkerVecEnv
 
 _BATCH = 256

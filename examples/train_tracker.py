@@ -18,8 +18,8 @@ from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
-from loco_drake.tracking.ppo import PpoConfig
-from loco_drake.tracking.train import Progress, TrainingConfig, train_tracker
+from loco_drake.tracking.config import PpoConfig, TrainingConfig
+from loco_drake.tracking.train import Progress, train_tracker
 
 
 def train(

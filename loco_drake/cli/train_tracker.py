@@ -19,8 +19,9 @@ from loco_drake.cli.training import print_stopped
 from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.common.run_folder import check_folder, options_of
 from loco_drake.models.robots import get_robot
+from loco_drake.tracking.config import TrainingConfig
 from loco_drake.tracking.references import load_references
-from loco_drake.tracking.train import NAME, POLICY, TrainingConfig, train_tracker
+from loco_drake.tracking.train import NAME, POLICY, train_tracker
 from loco_drake.tracking.train import Progress as TrainingProgress
 
 

@@ -13,9 +13,8 @@ from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.reward import reward_terms
 from loco_drake.control.state import ORIENTATION, POSITION, split, unit_base
 from loco_drake.models.robots import get_robot
-from loco_drake.tracking.environment_config import EnvironmentConfig
+from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.physics import make_worlds
-from loco_drake.tracking.terminations import has_strayed
 
 Array = NDArray[np.float64]
 
@@ -126,7 +125,7 @@ class TrackingBatch:
         fallen = has_fallen(self._robot, split(self._state)[0], self._R_WB)
         self.penalty = self._config.position_penalty * np.linalg.norm(gap, axis=1)
         self.penalty += self._config.fall_cost * fallen
-        lost = fallen | has_strayed(self._config.termination, self._state, wanted)
+        lost = fallen | self._config.termination.exceeded(self._state, wanted)
         return terms, lost, ~lost & (self.sample >= self._last)
 
     def observe(

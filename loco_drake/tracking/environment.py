@@ -10,7 +10,7 @@ from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.control.plan import Plan
 from loco_drake.control.reward import REWARD_TERMS
 from loco_drake.tracking.batch import TrackingBatch
-from loco_drake.tracking.environment_config import EnvironmentConfig
+from loco_drake.tracking.config import EnvironmentConfig
 
 Observation = NDArray[np.float32]
 

@@ -15,7 +15,7 @@ from loco_drake.models.plant import ConfigureSimulator, PlantConfig
 from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.domain import SetDomain
 from loco_drake.systems.scenario import Disturbances, ExternalTargets, Scenario
-from loco_drake.tracking.environment_config import EnvironmentConfig
+from loco_drake.tracking.config import EnvironmentConfig
 
 Array = NDArray[np.float64]
 

@@ -1,98 +1,95 @@
-"""Proximal policy optimization: stable-baselines3's, with a rate set by the KL."""
+"""Proximal policy optimization: stable-baselines3's, exactly symmetric, rate by KL."""
 
-from dataclasses import dataclass, field
 from typing import Any, cast
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3 import PPO
+from stable_baselines3.common.distributions import Distribution
+from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.running_mean_std import RunningMeanStd
-from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
+from torch import Tensor
 
-from loco_drake.common.errors import InputError, check_at_least
-from loco_drake.control.actor import OBSERVATION_CLIP, Actor, ActorConfig
-from loco_drake.control.symmetry import mirror_observations
-from loco_drake.tracking.symmetric_policy import (
-    Mirror,
-    SymmetricPolicy,
-    SymmetricStatistics,
+from loco_drake.control.actor import (
+    OBSERVATION_CLIP,
+    Actor,
+    ActorConfig,
+    unprivileged_mask,
 )
+from loco_drake.control.symmetry import mirror_actions, mirror_observations
+from loco_drake.tracking.config import PpoConfig
 
 
-@dataclass(kw_only=True)
-class PpoConfig:
-    """How to learn."""
+class SymmetricPolicy(ActorCriticPolicy):
+    """stable-baselines3's policy, averaged over the robot and its mirror image.
 
-    batch: int = 4096
-    """Environment steps between updates; what is saved lags no more behind."""
-    minibatch: int = 1024
-    """Environment steps in a gradient step, of those of a batch."""
-    epochs: int = 5
-    """Passes over a batch."""
-    gamma: float = 0.97
-    """Discount a step."""
-    gae_lambda: float = 0.95
-    """Of generalized advantage estimation."""
-    clip: float = 0.2
-    """Range of the probability ratio."""
-    actor_rate: float = 5e-4
-    """Learning rate of the actor to start with."""
-    target_kl: float = 0.02
-    """Divergence that an update should have; the actor's learning rate follows it
-    (Schulman et al. 2017; Rudin et al. 2022)."""
-    critic_rate: float = 1e-3
-    """Learning rate of the critic, which has nothing to diverge from."""
-    log_std: float = -0.7
-    """Initial log standard deviation of the actions."""
-    hidden: list[int] = field(default_factory=lambda: [256, 128])
-    """Widths of the hidden layers of actor and critic each."""
-    privileged: bool = True
-    """Whether the policy sees where in the world the base is and how fast it moves,
-    which a robot outside simulation does not know well; the critic always does."""
+    The mean action mirrors with the observation, and the value does not change with
+    it, exactly. Observations must be normalized by :class:`SymmetricStatistics`.
 
-    def check(self, environments: int) -> None:
-        """Raises InputError unless it fits so many environments."""
-        if self.batch < 2 * environments:
-            raise InputError(
-                f"--batch must be at least {2 * environments}, two steps of each of "
-                f"{environments} environments, not {self.batch}."
-            )
-        for name in ("minibatch", "epochs"):
-            check_at_least(name, getattr(self, name), 1)
-        if not self.hidden or min(self.hidden) < 1:
-            raise InputError(f"--hidden must be widths above 0, not {self.hidden}.")
-        for name, most in (
-            ("gamma", 1.0),
-            ("gae_lambda", 1.0),
-            ("clip", 1.0),
-            ("actor_rate", 1.0),
-            ("target_kl", np.inf),
-            ("critic_rate", 1.0),
-        ):
-            value = getattr(self, name)
-            if not 0 < value <= most or np.isinf(value):
-                limit = f" and at most {most:g}" if np.isfinite(most) else ""
-                option = "--" + name.replace("_", "-")
-                raise InputError(f"{option} must be above 0{limit}, not {value}.")
-        if not np.isfinite(self.log_std):
-            raise InputError(f"--log-std must be a number, not {self.log_std}.")
+    Args:
+        *args: as of ActorCriticPolicy.
+        privileged: whether the actor sees all of the observation; the critic, which is
+            needed in training only, always does (Pinto et al. 2018, "Asymmetric actor
+            critic").
+        **kwargs: as of ActorCriticPolicy.
+    """
+
+    _mask: Tensor
+
+    def __init__(
+        self,
+        *args: Any,
+        privileged: bool = True,
+        **kwargs: Any,
+    ) -> None:
+        super().__init__(*args, **kwargs)
+        self._privileged = privileged
+        self.register_buffer("_mask", unprivileged_mask(), persistent=False)
+
+    def forward(
+        self, obs: Any, deterministic: bool = False
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Returns actions (B, 12), values (B, 1) and log probabilities (B,)."""
+        distribution, values = self._evaluate(obs)
+        actions = distribution.get_actions(deterministic=deterministic)
+        return actions, values, distribution.log_prob(actions)
+
+    def evaluate_actions(
+        self, obs: Any, actions: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor | None]:
+        """Returns values (B, 1), log probabilities (B,) and entropies (B,)."""
+        distribution, values = self._evaluate(obs)
+        return values, distribution.log_prob(actions), distribution.entropy()
+
+    def get_distribution(self, obs: Any) -> Distribution:
+        """Returns the distribution of actions."""
+        return self._evaluate(obs)[0]
+
+    def predict_values(self, obs: Any) -> Tensor:
+        """Returns values, shape (B, 1)."""
+        return self._evaluate(obs)[1]
+
+    def _evaluate(self, obs: Any) -> tuple[Distribution, Tensor]:
+        seen = torch.cat((obs, mirror_observations(obs)))
+        latent_vf = self.mlp_extractor.forward_critic(seen)
+        if not self._privileged:
+            seen = seen * self._mask
+        latent_pi = self.mlp_extractor.forward_actor(seen)
+        mean, image = self.action_net(latent_pi).chunk(2)
+        value, image_value = self.value_net(latent_vf).chunk(2)
+        mean = (mean + mirror_actions(image)) / 2
+        distribution = self.action_dist.proba_distribution(mean, self.log_std)
+        return distribution, (value + image_value) / 2
 
 
-class ScaleReward(VecEnvWrapper):
-    """Multiplies rewards by 1 - gamma, so that returns are between 0 and 1."""
+class SymmetricStatistics(RunningMeanStd):
+    """Mean and variance of observations and their mirror images."""
 
-    def __init__(self, venv: VecEnv, gamma: float) -> None:
-        super().__init__(venv)
-        self._scale = 1 - gamma
-
-    def reset(self) -> Any:
-        """See VecEnv."""
-        return self.venv.reset()
-
-    def step_wait(self) -> Any:
-        """See VecEnv."""
-        observations, rewards, dones, infos = self.venv.step_wait()
-        return observations, rewards * self._scale, dones, infos
+    def update(self, arr: NDArray[Any]) -> None:
+        """Takes observations (N, size) into account."""
+        super().update(np.concatenate((arr, mirror_observations(arr))))
 
 
 class AdaptivePPO(PPO):
@@ -134,29 +131,23 @@ class AdaptivePPO(PPO):
         optimizers.param_groups[0]["lr"] = self.rate
 
 
-def make_ppo(
-    environment: VecEnv,
-    config: PpoConfig,
-    seed: int,
-    mirror: Mirror = mirror_observations,
-) -> AdaptivePPO:
+def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
     """Returns a learner on ``environment``, its observations normalized.
 
     Args:
         environment: what to learn in.
         config: how to learn.
         seed: of everything random.
-        mirror: of the environment's observations.
     """
     normalized = VecNormalize(
-        ScaleReward(environment, config.gamma),
+        environment,
         norm_reward=False,
         clip_obs=OBSERVATION_CLIP,
         gamma=config.gamma,
     )
     shape = environment.observation_space.shape
     assert shape is not None
-    normalized.obs_rms = cast(Any, SymmetricStatistics(shape, mirror))
+    normalized.obs_rms = cast(Any, SymmetricStatistics(shape=shape))
     learner = AdaptivePPO(
         SymmetricPolicy,
         normalized,
@@ -174,7 +165,6 @@ def make_ppo(
             "activation_fn": torch.nn.ELU,
             "log_std_init": config.log_std,
             "privileged": config.privileged,
-            "mirror": mirror,
         },
         seed=seed,
         device="cpu",

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import gymnasium
 
 if TYPE_CHECKING:
+    from loco_drake.tracking.config import EnvironmentConfig
     from loco_drake.tracking.environment import TrackingEnv
-    from loco_drake.tracking.environment_config import EnvironmentConfig
 
 
 def register() -> None:
@@ -43,8 +43,8 @@ def make_tracking(
         seed: of what is generated.
     """
     from loco_drake.models.robots import get_robot
+    from loco_drake.tracking.config import EnvironmentConfig
     from loco_drake.tracking.environment import TrackingEnv
-    from loco_drake.tracking.environment_config import EnvironmentConfig
     from loco_drake.tracking.references import generate_references, load_references
 
     config = config or EnvironmentConfig()

@@ -29,11 +29,9 @@ class PlanSampler:
     Args:
         plans: what to draw from; the label of a plan is that of its first sample.
         seed: of the draws.
-        power: of the lack.
     """
 
-    def __init__(self, plans: list[Plan], seed: int, power: float = 2.0) -> None:
-        self._power = power
+    def __init__(self, plans: list[Plan], seed: int) -> None:
         self._labels = np.array([int(plan.labels[0]) for plan in plans])
         self.present = np.unique(self._labels)
         # Mean normalized return of recent episodes, 0 to 1, by label.
@@ -62,7 +60,7 @@ class PlanSampler:
         most: float,
     ) -> int:
         lack = np.clip(1 - scores, _LEAST, most)
-        episodes = lack**self._power / np.maximum(shares, _SHORTEST)
+        episodes = lack**2 / np.maximum(shares, _SHORTEST)
         return int(self.random.choice(among, p=episodes / episodes.sum()))
 
     def record(self, plan: int, score: float, share: float) -> None:

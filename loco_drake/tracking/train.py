@@ -3,20 +3,19 @@
 import json
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from threading import Event
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import torch
-import tyro
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from torch import Tensor
 
 from loco_drake.common.determinism import single_thread
-from loco_drake.common.errors import InputError, check_at_least
+from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import (
     Checkpoint,
     RunFolder,
@@ -34,9 +33,9 @@ from loco_drake.control.actor import ActorConfig, save_actor
 from loco_drake.control.observation import OBSERVATION_LAYOUT
 from loco_drake.control.plan import Plan
 from loco_drake.motion.gaits import ROW_LABELS
-from loco_drake.tracking.environment_config import EnvironmentConfig
+from loco_drake.tracking.config import TrainingConfig
 from loco_drake.tracking.learning_curve import PROGRESS, learning_curve, trim_log
-from loco_drake.tracking.ppo import AdaptivePPO, PpoConfig, export_actor, make_ppo
+from loco_drake.tracking.ppo import AdaptivePPO, export_actor, make_ppo
 from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.workers import WorkerVecEnv
 
@@ -46,33 +45,6 @@ POLICY = "policy.safetensors"
 _LAYOUT = [list(part) for part in OBSERVATION_LAYOUT]
 # What the sampler knows of labels and plans.
 _SCORES = ("scores", "shares", "plan_scores", "plan_shares")
-
-
-@dataclass(kw_only=True)
-class TrainingConfig:
-    """How to train a tracker."""
-
-    steps: int = 2_000_000
-    """Environment steps in all, of 20 ms each, those before a resume included."""
-    workers: int = 2
-    """Processes that simulate."""
-    per_worker: int = 8
-    """Environments in each process."""
-    seed: int = 0
-    """Of everything random."""
-    environment: Annotated[EnvironmentConfig, tyro.conf.arg(name="")] = field(
-        default_factory=EnvironmentConfig
-    )
-    """What is simulated."""
-    ppo: Annotated[PpoConfig, tyro.conf.arg(name="")] = field(default_factory=PpoConfig)
-    """How is learned."""
-
-    def check(self) -> None:
-        """Raises InputError unless a training can begin."""
-        for name in ("workers", "per_worker"):
-            check_at_least(name, getattr(self, name), 1)
-        self.environment.check()
-        self.ppo.check(self.workers * self.per_worker)
 
 
 @dataclass(frozen=True)
@@ -160,6 +132,8 @@ def train_tracker(
             sampler,
             workers=config.workers,
             per_worker=config.per_worker,
+            # Returns are then between 0 and 1.
+            reward_scale=1 - config.ppo.gamma,
             # Episodes after a resume are new ones.
             seed=config.seed + steps_before,
         )

@@ -4,11 +4,9 @@ import contextlib
 import gc
 import multiprocessing
 import signal
-from collections.abc import Sequence
 from multiprocessing.connection import Connection
 from typing import Any
 
-import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
@@ -16,8 +14,8 @@ from stable_baselines3.common.vec_env import VecEnv
 from loco_drake.common.determinism import use_one_thread
 from loco_drake.control.plan import Plan
 from loco_drake.tracking.batch import TrackingBatch
+from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
-from loco_drake.tracking.environment_config import EnvironmentConfig
 from loco_drake.tracking.sampler import PlanSampler
 
 # This share of the episodes that fell or lost their plan is followed by another try,
@@ -102,6 +100,7 @@ class WorkerVecEnv(VecEnv):
         sampler: draws the plan of each episode and is told how it went.
         workers: processes.
         per_worker: environments in each; many amortise pipes and inference.
+        reward_scale: factor of the rewards.
         seed: of the environments' own randomness.
 
     Raises:
@@ -119,11 +118,13 @@ class WorkerVecEnv(VecEnv):
         workers: int,
         per_worker: int,
         seed: int,
+        reward_scale: float = 1.0,
     ) -> None:
         super().__init__(workers * per_worker, OBSERVATION_SPACE, ACTION_SPACE)
         self._sampler = sampler
         self._episode_steps = config.episode_steps
         self._per_worker = per_worker
+        self._reward_scale = reward_scale
         # What each environment goes on with when its episode is over.
         self._next_plans = [sampler.draw() for _ in range(self.num_envs)]
         # Episodes that are another try: too hard to be counted.
@@ -192,7 +193,8 @@ class WorkerVecEnv(VecEnv):
                 self._next_plans[i] = self._sampler.draw()
             self._returns[i] = 0
             self._lengths[i] = 0
-        return observations, (returns - penalties).astype(np.float32), dones, infos
+        rewards = (returns - penalties).astype(np.float32) * self._reward_scale
+        return observations, rewards, dones, infos
 
     def close(self) -> None:
         """Ends the workers."""
@@ -225,29 +227,15 @@ class WorkerVecEnv(VecEnv):
                 raise ChildProcessError(_DIED) from None
         return results
 
-    # What VecEnv asks for beyond stepping; the environments are in other processes.
-
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """Returns an attribute of this object, once for each environment."""
-        return [getattr(self, attr_name)] * len(self._indices(indices))
+        return [getattr(self, attr_name)] * self.num_envs
 
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Not supported: environments are configured when they are made."""
-        raise NotImplementedError("configure environments by EnvironmentConfig")
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """Returns False for each environment: none is wrapped."""
+        return [False] * self.num_envs
 
-    def env_method(
-        self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any
-    ) -> list[Any]:
-        """Not supported: environments live in other processes."""
+    def _elsewhere(self, *args: Any, **kwargs: Any) -> Any:
         raise NotImplementedError("environments live in worker processes")
 
-    def env_is_wrapped(
-        self,
-        wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]],
-        indices: Any = None,
-    ) -> list[bool]:
-        """Returns False for each environment: none is wrapped."""
-        return [False] * len(self._indices(indices))
-
-    def _indices(self, indices: Any) -> Sequence[int]:
-        return list(self._get_indices(indices))
+    set_attr = env_method = _elsewhere

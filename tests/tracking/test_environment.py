@@ -17,11 +17,10 @@ from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
 from loco_drake.systems.simulator import MakeSimulator, StartEpisode
 from loco_drake.tracking.batch import TrackingBatch
+from loco_drake.tracking.config import EnvironmentConfig, ResetNoise, TerminationConfig
 from loco_drake.tracking.environment import TrackingEnv
-from loco_drake.tracking.environment_config import EnvironmentConfig, ResetNoise
 from loco_drake.tracking.references import load_references
 from loco_drake.tracking.registration import make_tracking
-from loco_drake.tracking.terminations import TerminationConfig
 from tests.synthetic_motion import synthetic_motion
 
 ANYWHERE = TerminationConfig(position=1e3, rotation=1e3)  # but fallen
@@ -111,10 +110,11 @@ def test_a_step_is_what_the_diagram_does(plans, contact, time_step, tolerance):
         np.testing.assert_allclose(terms[0], theirs, rtol=0, atol=tolerance)
 
 
-def test_homing_takes_its_share_for_each_metre_beside_the_plan(plans):
+def test_the_position_penalty_takes_its_share_for_each_metre_beside_the_plan(plans):
     """Of the reward, not of its terms, from which returns are made."""
     free, called = (
-        TrackingEnv(plans, EnvironmentConfig(homing=homing)) for homing in (0.0, 0.3)
+        TrackingEnv(plans, EnvironmentConfig(position_penalty=homing))
+        for homing in (0.0, 0.3)
     )
     for env in (free, called):
         env.reset(seed=0, options={"plan": 0, "sample": 10})

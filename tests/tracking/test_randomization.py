@@ -17,8 +17,8 @@ from loco_drake.systems.scenario import (
 )
 from loco_drake.systems.simulator import MakeSimulator
 from loco_drake.tracking.batch import TrackingBatch
+from loco_drake.tracking.config import EnvironmentConfig, ResetNoise, TerminationConfig
 from loco_drake.tracking.environment import TrackingEnv
-from loco_drake.tracking.environment_config import EnvironmentConfig, ResetNoise
 from loco_drake.tracking.randomization import (
     BIAS,
     PUSH_DURATION,
@@ -26,7 +26,6 @@ from loco_drake.tracking.randomization import (
     WHITE,
     RandomizationConfig,
 )
-from loco_drake.tracking.terminations import TerminationConfig
 
 NO_NOISE = ResetNoise(joints=0, velocities=0, position=0, heading=0)
 PARTS = [part.name for part in fields(STANDARD) if part.name != "push_interval"]

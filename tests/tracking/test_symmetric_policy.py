@@ -1,6 +1,5 @@
 """Actor and critic in training: left is as good as right."""
 
-import gymnasium
 import numpy as np
 import pytest
 import torch
@@ -8,7 +7,7 @@ import torch
 from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
 from loco_drake.control.symmetry import mirror_actions, mirror_observations
 from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
-from loco_drake.tracking.symmetric_policy import SymmetricPolicy, SymmetricStatistics
+from loco_drake.tracking.ppo import SymmetricPolicy, SymmetricStatistics
 
 
 def test_an_image_is_as_likely_and_as_valuable_as_the_step():
@@ -71,30 +70,6 @@ def test_sampled_actions_have_the_probability_that_is_told():
     torch.testing.assert_close(values, again[0])
     torch.testing.assert_close(log_prob, again[1])
     torch.testing.assert_close(mean, distribution.distribution.mean)
-
-
-def test_other_observations_have_a_mirror_of_their_own():
-    """Four columns of which the first two change places."""
-
-    def mirror(values):
-        return values[..., [1, 0, 2, 3]]
-
-    torch.manual_seed(2)
-    space = gymnasium.spaces.Box(-np.inf, np.inf, (4,), np.float32)
-    policy = SymmetricPolicy(space, ACTION_SPACE, lambda _: 1e-3, mirror=mirror)
-    torch.nn.init.normal_(policy.action_net.weight, std=0.5)
-    observations = torch.randn(6, 4)
-    with torch.inference_mode():
-        mean = policy.get_distribution(observations).distribution.mean
-        image_mean = policy.get_distribution(mirror(observations)).distribution.mean
-        values = policy.predict_values(observations)
-        image_values = policy.predict_values(mirror(observations))
-    torch.testing.assert_close(image_mean, mirror_actions(mean))
-    torch.testing.assert_close(image_values, values)
-    assert (image_mean - mean).abs().max() > 0.01
-    statistics = SymmetricStatistics((4,), mirror)
-    statistics.update(np.array([[1.0, 3.0, 5.0, 7.0]] * 100))
-    np.testing.assert_allclose(statistics.mean, [2.0, 2.0, 5.0, 7.0], atol=1e-5)
 
 
 def test_normalized_observations_mirror_like_any():

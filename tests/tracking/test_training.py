@@ -14,11 +14,10 @@ from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.control.symmetry import mirror_actions, mirror_observations
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
-from loco_drake.tracking.environment_config import EnvironmentConfig
-from loco_drake.tracking.ppo import PpoConfig
+from loco_drake.tracking.config import EnvironmentConfig, PpoConfig, TrainingConfig
 from loco_drake.tracking.randomization import STANDARD
 from loco_drake.tracking.sampler import PlanSampler
-from loco_drake.tracking.train import TrainingConfig, train_tracker
+from loco_drake.tracking.train import train_tracker
 from loco_drake.tracking.workers import WorkerVecEnv
 
 pytestmark = pytest.mark.slow
@@ -298,15 +297,6 @@ def test_the_sampler_prefers_what_lacks_most(plans):
     draws = np.array([sampler.draw() for _ in range(3000)])
     share = np.mean([plans[i].labels[0] == PACE for i in draws])
     assert share == pytest.approx(1 / 2, abs=0.03)
-
-
-def test_the_sampler_prefers_by_the_power_it_is_given(plans):
-    """With 1, five draws in six are a pace."""
-    sampler = PlanSampler(plans, 0, power=1.0)
-    sampler.scores[TROT], sampler.scores[PACE] = 0.9, 0.5
-    draws = np.array([sampler.draw() for _ in range(3000)])
-    share = np.mean([plans[i].labels[0] == PACE for i in draws])
-    assert share == pytest.approx(5 / 6, abs=0.03)
 
 
 def test_gaits_that_fall_early_still_get_their_steps(plans):
