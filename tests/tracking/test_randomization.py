@@ -207,7 +207,7 @@ def test_rewards_are_of_the_true_state_observations_of_the_measured_one(plans):
 
 
 def test_without_position_only_position_is_forgiven():
-    config = EnvironmentConfig(randomization=STANDARD).without_position()
+    config = EnvironmentConfig(randomization=STANDARD).known_to(privileged=False)
     assert config.termination.position == 1.0
     assert config.termination.rotation == EnvironmentConfig().termination.rotation
     assert config.reset_noise.position == 0.0
@@ -217,5 +217,5 @@ def test_without_position_only_position_is_forgiven():
 
 def test_without_position_a_wider_tube_stays():
     tube = TerminationConfig(position=1.5)
-    config = EnvironmentConfig(termination=tube).without_position()
+    config = EnvironmentConfig(termination=tube).known_to(privileged=False)
     assert config.termination.position == 1.5
