@@ -6,11 +6,11 @@ is compared with CENIC at accuracy 1e-5. Run it from the root of the repository:
     python benchmarks/contact_convergence.py [--robot a1] [--speed 0.8]
 """
 
-import argparse
 import time
 from collections.abc import Iterator
 
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 from pydrake.geometry import (
     DefaultProximityProperties,
@@ -25,7 +25,7 @@ from pydrake.systems.framework import DiagramBuilder
 from loco_drake.common.rotations import yaw_of
 from loco_drake.models.legs import LEGS
 from loco_drake.models.plant import AddRobotPlant, ConfigureSimulator, PlantConfig
-from loco_drake.models.robots import ROBOTS, get_robot
+from loco_drake.models.robots import get_robot
 from loco_drake.models.trot import AddTrotSource
 
 DURATION = 4.0  # s
@@ -90,12 +90,8 @@ def settings() -> Iterator[tuple[str, PlantConfig]]:
             yield f"{contact}, {1e3 * step:.0f} ms", config
 
 
-def main() -> None:
-    """Prints a table for each kind of foot."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--robot", choices=ROBOTS, default="go2")
-    parser.add_argument("--speed", type=float, default=0.4, help="of the toes, m/s")
-    arguments = parser.parse_args()
+def main(robot: str = "go2", speed: float = 0.4) -> None:
+    """Prints a table for each kind of foot; ``speed`` is that of the toes, m/s."""
     for stiffness in FEET:
         feet = "Drake's defaults" if stiffness is None else f"{stiffness:.0e} N/m"
         print(f"\nFeet: {feet}\n")
@@ -103,7 +99,7 @@ def main() -> None:
         print("|---|---:|---:|---:|---:|")
         reference = None
         for label, config in settings():
-            final, factor = run(arguments.robot, config, stiffness, arguments.speed)
+            final, factor = run(robot, config, stiffness, speed)
             if reference is None:
                 reference = final
                 x, y, yaw = final
@@ -115,4 +111,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main)

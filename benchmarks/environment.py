@@ -12,8 +12,6 @@ Run it from the root of the repository:
     OMP_NUM_THREADS=1 python benchmarks/environment.py
 """
 
-import argparse
-import json
 import statistics
 import time
 from collections.abc import Callable
@@ -21,11 +19,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from loco_drake.common.files import atomic_path
+from loco_drake.cli.output import write_json
 from loco_drake.control.action import set_points
 from loco_drake.control.fall import has_fallen
 from loco_drake.control.observation import LOOK_AHEAD, Preview, observe
@@ -187,30 +186,34 @@ def parts(plan: Plan, calls: int = 100) -> dict[str, float]:
     return seconds
 
 
-def main() -> None:
-    """Measures and prints."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=320, help="in each turn")
-    parser.add_argument("--turns", type=int, default=15)
-    parser.add_argument("--contact", default="similar")
-    parser.add_argument("--time-step", type=float, default=0.01, help="s")
-    parser.add_argument(
-        "--randomize", action="store_true", help="all parts, but for the bare plant"
-    )
-    parser.add_argument("--json", type=Path, help="where to write the figures")
-    arguments = parser.parse_args()
+def main(
+    steps: int = 320,
+    turns: int = 15,
+    contact: str = "similar",
+    time_step: float = 0.01,
+    randomize: bool = False,
+    json: Path | None = None,
+) -> None:
+    """Measures and prints.
 
-    config = PlantConfig(contact=arguments.contact, time_step=arguments.time_step)
+    Args:
+        steps: in each turn.
+        turns: medians are of.
+        contact: solver.
+        time_step: of the physics, s.
+        randomize: draw worlds in the environment.
+        json: where to write the figures.
+    """
+    config = PlantConfig(contact=contact, time_step=time_step)
     plans = make_plans()
-    randomization = STANDARD if arguments.randomize else RandomizationConfig()
+    randomization = STANDARD if randomize else RandomizationConfig()
     environment = Environment(plans, config, randomization)
     bare = BarePlant(config)
-    steps = arguments.steps
     bare.follow(environment.run(100)[1])  # warm
     environment.resets, environment.reset_seconds = 0, 0.0
 
     seconds: dict[str, list[float]] = {name: [] for name in ROWS}
-    for _ in range(arguments.turns):
+    for _ in range(turns):
         own, episodes = environment.run(steps)
         for name, spent in zip(
             ROWS, (own, bare.follow(episodes), bare.stand(steps)), strict=True
@@ -221,21 +224,18 @@ def main() -> None:
     print(f"{'':26} steps/s  ms a step  ratio")
     for name, key in ROWS.items():
         each = statistics.median(seconds[name]) / steps
-        turns = zip(seconds[name], seconds["environment"], strict=True)
-        ratio = statistics.median(theirs / own for theirs, own in turns)
+        pairs = zip(seconds[name], seconds["environment"], strict=True)
+        ratio = statistics.median(theirs / own for theirs, own in pairs)
         print(f"{name:26} {1 / each:7.0f} {1e3 * each:10.3f} {ratio:6.3f}")
         figures[f"{key}_steps_per_second"] = 1 / each
         figures[f"ratio_to_{key}"] = ratio
-    resets = 1e3 * environment.reset_seconds / steps / arguments.turns
     print("\nof the environment's step (the functions alone, in a loop):")
-    named = {f"resets ({environment.resets})": resets}
-    named |= {name: 1e3 * each for name, each in parts(plans[0]).items()}
-    for name, milliseconds in named.items():
-        print(f"{name:26} {milliseconds:18.3f}")
-    if arguments.json is not None:
-        with atomic_path(arguments.json) as temporary:
-            temporary.write_text(json.dumps(figures, indent=2) + "\n")
+    resets = f"resets ({environment.resets})"
+    costs = {resets: environment.reset_seconds / steps / turns, **parts(plans[0])}
+    for name, each in costs.items():
+        print(f"{name:26} {1e3 * each:18.3f}")
+    write_json(json, figures)
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main)

@@ -9,8 +9,6 @@ Run it from the root of the repository:
     OMP_NUM_THREADS=1 python benchmarks/training.py
 """
 
-import argparse
-import json
 import multiprocessing
 import os
 import statistics
@@ -21,9 +19,10 @@ from pathlib import Path
 
 import numpy as np
 import torch
+import tyro
 from environment import ROBOT, ROBOTS, make_plans
 
-from loco_drake.common.files import atomic_path
+from loco_drake.cli.output import write_json
 from loco_drake.control.plan import Plan
 from loco_drake.tracking.config import EnvironmentConfig, PpoConfig, TrainingConfig
 from loco_drake.tracking.sampler import PlanSampler
@@ -101,31 +100,28 @@ def memory(plans: list[Plan], iterations: int) -> dict[str, list[float]]:
     return {name: [first[name], last[name]] for name in first}
 
 
-def main() -> None:
-    """Measures and prints."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=30, help="of each, in each turn")
-    parser.add_argument("--turns", type=int, default=15)
-    parser.add_argument("--iterations", type=int, default=100)
-    parser.add_argument("--json", type=Path, help="where to write the figures")
-    arguments = parser.parse_args()
-    torch.set_num_threads(1)
+def main(
+    steps: int = 30, turns: int = 15, iterations: int = 100, json: Path | None = None
+) -> None:
+    """Measures and prints.
 
+    Args:
+        steps: of each, in each turn.
+        turns: medians are of.
+        iterations: batches of the training.
+        json: where to write the figures.
+    """
+    torch.set_num_threads(1)
     plans = make_plans()
-    speed = scaling(plans, arguments.steps, arguments.turns)
+    speed = scaling(plans, steps, turns)
     for name, value in speed.items():
         print(f"{name.replace('_', ' '):30} {value:8.2f}")
-    grown = memory(plans, arguments.iterations)
-    print(
-        f"\nMB after {arguments.iterations // 10} and {arguments.iterations} batches:"
-    )
+    grown = memory(plans, iterations)
+    print(f"\nMB after {iterations // 10} and {iterations} batches:")
     for name, (first, last) in grown.items():
         print(f"{name:30} {first:8.1f} {last:8.1f}")
-    if arguments.json is not None:
-        with atomic_path(arguments.json) as temporary:
-            figures = {"scaling": speed, "resident_mb": grown}
-            temporary.write_text(json.dumps(figures, indent=2) + "\n")
+    write_json(json, {"scaling": speed, "resident_mb": grown})
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main)
