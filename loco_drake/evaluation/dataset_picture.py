@@ -11,6 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from sklearn.decomposition import PCA
+from sklearn.preprocessing import StandardScaler
 
 from loco_drake.datasets.split import TRAIN, VALIDATION
 from loco_drake.generation.features import SIZE, motion_features
@@ -73,18 +75,13 @@ def describe(motion: Motion) -> MotionPoint:
 
 
 def principal_components(rows: Array, count: int = 2) -> tuple[Array, Array]:
-    """Returns the projections of rows (N, D) on their first principal components.
+    """Returns projections (N, count) of rows (N, D), and each one's share of variance.
 
     Columns are first divided by their standard deviation.
-
-    Returns:
-        Projections, shape (N, ``count``), and the share of the variance of each.
     """
-    deviation = rows.std(axis=0)
-    scaled = (rows - rows.mean(axis=0)) / np.where(deviation > 0, deviation, 1.0)
-    left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
-    share = singular**2 / (singular**2).sum()
-    return left[:, :count] * singular[:count], share[:count]
+    scaled = StandardScaler().fit_transform(rows)
+    analysis = PCA(count, svd_solver="full")
+    return analysis.fit_transform(scaled), analysis.explained_variance_ratio_
 
 
 def library_figure(points: Iterable[MotionPoint], title: str) -> Figure:

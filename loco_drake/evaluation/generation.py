@@ -15,9 +15,9 @@ from loco_drake.evaluation.frechet import frechet_distance, moments
 from loco_drake.evaluation.motion_scores import compare, measure, overall
 from loco_drake.evaluation.nearest import nearest_distances
 from loco_drake.evaluation.recognition import (
-    LinearRecognizer,
     Recognition,
     TransformerRecognizer,
+    linear_recognizer,
     recognize,
 )
 from loco_drake.evaluation.recorded import Recorded
@@ -111,7 +111,7 @@ def score_generation(
         recognition = {}
         for kind, fit in (
             ("transformer", lambda s, seed: TransformerRecognizer(s, seed, steps)),
-            ("linear", LinearRecognizer),
+            ("linear", linear_recognizer),
         ):
             recognition[kind] = recognize(
                 fit, of_train, of_validation, of_sets, seeds, _prefix(kind, say)

@@ -21,7 +21,6 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,35 +47,20 @@ Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 
-class Recognizer(Protocol):
-    """A trained classifier."""
-
-    def __call__(self, samples: Samples) -> Labels:
-        """Returns the label, as index into LABELS, of each side, shape (N, 2)."""
-        ...
-
-
+# Returns the label, as index into LABELS, of each side of samples, shape (N, 2).
+Recognizer = Callable[[Samples], Labels]
 # Trains a classifier on samples, with a seed.
 Fit = Callable[[Samples, int], Recognizer]
 
 
-class LinearRecognizer:
-    """Multinomial logistic regression on the summaries.
+def linear_recognizer(samples: Samples, seed: int = 0) -> Recognizer:
+    """Fits a multinomial logistic regression to the summaries; nothing is random."""
 
-    Args:
-        samples: to learn from; nothing is random.
-        seed: not used.
-    """
+    def features(of: Samples) -> Array:
+        return of.summaries.reshape(2 * len(of), -1)
 
-    def __init__(self, samples: Samples, seed: int = 0) -> None:
-        features = samples.summaries.reshape(2 * len(samples), -1)
-        self._fitted = fit_linear(features, np.repeat(samples.labels, 2))
-
-    def __call__(self, samples: Samples) -> Labels:
-        """Returns the label of each side, shape (N, 2)."""
-        features = samples.summaries.reshape(2 * len(samples), -1)
-        found: Labels = self._fitted.predict(features).reshape(-1, 2)
-        return found
+    fitted = fit_linear(features(samples), np.repeat(samples.labels, 2))
+    return lambda tested: fitted.predict(features(tested)).reshape(-1, 2)
 
 
 class TransformerRecognizer:

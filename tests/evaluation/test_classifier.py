@@ -10,7 +10,7 @@ from loco_drake.evaluation.classifier import (
     load_classifier,
     predict,
 )
-from loco_drake.evaluation.recognition import LinearRecognizer, TransformerRecognizer
+from loco_drake.evaluation.recognition import TransformerRecognizer, linear_recognizer
 from loco_drake.evaluation.samples import make_samples
 from loco_drake.evaluation.train_classifier import class_indices, train_classifier
 from loco_drake.generation.loop_settings import LoopSettings
@@ -55,7 +55,7 @@ def test_nothing_is_learned_from_shuffled_labels():
             train.labels[random.permutation(gait)] = np.repeat(
                 np.unique(test.labels), 20
             )
-        recognizer = LinearRecognizer(train)
+        recognizer = linear_recognizer(train)
         accuracies.append((recognizer(test) == test.labels[:, None]).mean())
     assert abs(np.mean(accuracies) - 0.5) < 0.15
 

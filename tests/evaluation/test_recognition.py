@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from loco_drake.evaluation.recognition import (
-    LinearRecognizer,
     confusion_matrix,
+    linear_recognizer,
     recognize,
 )
 from loco_drake.evaluation.samples import join, make_samples
@@ -50,7 +50,9 @@ def real():
 
 
 def test_generated_motion_like_recordings_scores_one(real):
-    found = recognize(LinearRecognizer, *real, [samples(16, 1), samples(16, 2)], [0, 1])
+    found = recognize(
+        linear_recognizer, *real, [samples(16, 1), samples(16, 2)], [0, 1]
+    )
     assert set(found.accuracies) == set(ROWS)
     for row in ROWS:
         assert set(found.accuracies[row]) == {"all", "dog", "mpc"}
@@ -73,7 +75,7 @@ def test_a_generator_that_writes_the_wrong_gait(real):
     paces = relabelled(paces[paces.labels == PACE], PACE, DOG_TROT)
     keep = good[good.labels != DOG_TROT]
     wrong = join((keep, paces))
-    found = recognize(LinearRecognizer, *real, [wrong], [0])
+    found = recognize(linear_recognizer, *real, [wrong], [0])
     quality = found.accuracies["real_to_generated"]
     assert quality["all"].mean == pytest.approx(2 / 3)
     assert quality["dog"].mean == pytest.approx(1 / 2)
@@ -92,7 +94,7 @@ def test_a_generator_that_always_writes_the_same_lacks_diversity(real):
         np.flatnonzero(train.labels == label)[0] for label in np.unique(train.labels)
     ]
     copies = train[np.repeat(one, 16)]
-    found = recognize(LinearRecognizer, train, validation, [copies], [0])
+    found = recognize(linear_recognizer, train, validation, [copies], [0])
     assert found.accuracies["real_to_generated"]["all"].mean == pytest.approx(1.0)
     assert found.accuracies["generated_to_real"]["all"].mean < 0.9
 
@@ -103,7 +105,7 @@ def test_matched_is_no_more_than_recordings_have(real):
 
     def fit(samples, seed):
         given.append(len(samples))
-        return LinearRecognizer(samples, seed)
+        return linear_recognizer(samples, seed)
 
     recognize(fit, *real, [samples(16, 1)], [0, 1])
     assert given == [36, 48, 36, 36, 48, 36]
