@@ -14,7 +14,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from loco_drake.cli.output import print_table, write_json
+from loco_drake.cli.output import print_table, write_results
 from loco_drake.cli.training import print_stopped
 from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.common.run_folder import check_folder, options_of
@@ -83,7 +83,7 @@ class TrainTracker(TrainingConfig):
                 options=options_of(self),
                 report=report,
             )
-        write_json(self.json, figures)
+        write_results(self.json, figures)
         rows = [(label, f"{score:.1f}") for label, score in figures["scores"].items()]
         print_table("Recent training returns, of 100", ("gait", "return"), rows)
         if figures["interrupted"]:
