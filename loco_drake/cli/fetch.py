@@ -80,6 +80,8 @@ class DataFetch:
         if folder.exists() and not folder.is_dir():
             raise InputError(f"{str(folder)!r} is a file, not a folder for recordings.")
         table = folder / "segments.csv"
+        if table.is_symlink():
+            raise InputError(f"{str(table)!r} is a link, and would not be written to.")
         rows = read_rows(table) if table.exists() else []
         missing = {
             source: [file for file in listed if not file.is_present(folder)]

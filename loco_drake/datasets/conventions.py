@@ -246,33 +246,18 @@ def check_motion(recording: Recording, body: Body, path: Path) -> None:
     points, fps = recording.points, recording.fps
     trunk = np.linalg.norm(points[:, 0] - points[:, 1], axis=-1) / _trunk_length(points)
     size = _size(points)
+    jumps = np.zeros((len(points), 6), dtype=bool)
     departure = np.linalg.norm(np.diff(points, n=2, axis=0), axis=-1)
-    jumps = departure > size * np.array([TRUNK_JUMP] * 2 + [body.jump] * 4)
+    jumps[2:] = departure > size * np.array([TRUNK_JUMP] * 2 + [body.jump] * 4)
     reach = np.linalg.norm(points[:, 2:] - points[:, [0, 0, 1, 1]], axis=-1)
-    for reason, first, wrong in (
-        (
-            "a point jumps (are lines missing, out of order or damaged?)",
-            2,
-            jumps.any(axis=-1),
-        ),
-        (
-            "the trunk changes its length",
-            0,
-            np.abs(trunk - 1) > TRUNK_STRETCH,
-        ),
-        (
-            "a toe is further away than a leg is long",
-            0,
-            (reach > REACH * size).any(axis=-1),
-        ),
-        (
-            "a toe is under the ground",
-            0,
-            (points[:, 2:, 2] < -DEPTH * size).any(axis=-1),
-        ),
-    ):
+    for reason, wrong in {
+        "a point jumps (are lines missing, out of order or damaged?)": jumps,
+        "the trunk changes its length": np.abs(trunk[:, None] - 1) > TRUNK_STRETCH,
+        "a toe is further away than a leg is long": reach > REACH * size,
+        "a toe is under the ground": points[:, 2:, 2] < -DEPTH * size,
+    }.items():
         if wrong.any():
-            frame = recording.first + first + int(np.argmax(wrong))
+            frame = recording.first + int(np.argmax(wrong.any(axis=1)))
             raise InputError(f"{path}: at frame {frame} {reason}.")
 
     height = _height(points)

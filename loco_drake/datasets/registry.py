@@ -8,7 +8,7 @@ from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 
-from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.errors import InputError, check_choice, one_line
 from loco_drake.common.files import cache_dir
 from loco_drake.datasets import dog, horse, mpc, solo8
 from loco_drake.datasets.conventions import measure
@@ -27,7 +27,7 @@ DATA_VARIABLE = "LOCO_DRAKE_DATA"
 # Installed packages name their datasets in this group of entry points.
 ENTRY_POINTS = "loco_drake.datasets"
 # Notes on what was mended that contradicts the format, and is said aloud.
-MENDED = {"up", "turned", "swapped", "ground"}
+MENDED = ("up", "turned", "swapped", "ground")
 
 
 @dataclass(frozen=True)
@@ -117,9 +117,17 @@ for _dataset in (
         read=solo8.read_solo8,
         body=solo8.BODY,
     ),
-    *(entry.load() for entry in entry_points(group=ENTRY_POINTS)),
 ):
     register_dataset(_dataset)
+
+for _entry in entry_points(group=ENTRY_POINTS):
+    try:
+        register_dataset(_entry.load())
+    except Exception as error:
+        raise InputError(
+            f"The installed dataset {_entry.name!r} cannot be taken: "
+            f"{type(error).__name__}: {error}"
+        ) from error
 
 
 def get_dataset(source: str) -> Dataset:
@@ -170,8 +178,9 @@ def read_clip(
         raise InputError(
             f"{path} cannot be read as a recording of {source}: {type(error).__name__}."
         ) from error
-    for name in MENDED & recording.notes.keys():
-        _warn(f"{path.name}: {name}: {recording.notes[name]}")
+    for name in MENDED:
+        if name in recording.notes:
+            _warn(f"{path.name}: {name}: {recording.notes[name]}")
     return KeypointClip(
         source=source,
         gait=gait,
@@ -205,7 +214,7 @@ def _stretch(
 @cache
 def _warn(text: str) -> None:
     """Logs a warning once, however often a process reads the file."""
-    logging.getLogger(__name__).warning("%s", text)
+    logging.getLogger(__name__).warning("%s", one_line(text))
 
 
 def data_target(path: Path | None = None) -> Path:

@@ -192,6 +192,10 @@ def refuse_decimal_commas(text: str, path: Path, what: str) -> None:
 
 def _with_commas(lines: list[str], path: Path, what: str) -> list[str]:
     """Returns the lines of a table, separated by commas and without quotes."""
+    while len(lines) > 1 and not lines[-1].strip(
+        ',;\t "'
+    ):  # as spreadsheets write empty rows
+        lines.pop()
     for line in lines[:2]:
         refuse_decimal_commas(line, path, what)
     if "," in lines[0]:

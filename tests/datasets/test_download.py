@@ -151,6 +151,36 @@ def test_a_folder_that_cannot_be_written_to_ends_the_download(mirror, files, tmp
         fetch(files, tmp_path / "data", mirror)
 
 
+@pytest.mark.parametrize("over_http", [True, False])
+def test_link_that_leads_out_of_the_data_folder_is_not_followed(
+    over_http, mirror, files, tmp_path
+):
+    """Whether it is a file's or a folder's; nothing appears behind it."""
+    outside, folder = tmp_path / "outside", tmp_path / "data"
+    outside.mkdir()
+    (folder / "dog_mann").mkdir(parents=True)
+    (folder / NAMES[0]).symlink_to(outside / "a.txt")
+    (folder / "horse_vhdc").symlink_to(outside)
+    with serve(mirror) as server:
+        errors = fetch(files, folder, server.url if over_http else mirror)
+    assert list(errors) == [NAMES[0], NAMES[2]]
+    assert set(errors.values()) == {"is led out of the data folder by a link"}
+    assert not list(outside.iterdir())
+
+
+@pytest.mark.parametrize("over_http", [True, False])
+def test_longer_file_than_the_manifest_says_is_refused_on_the_way(
+    over_http, mirror, files, tmp_path
+):
+    (mirror / NAMES[0]).write_bytes(CONTENTS[NAMES[0]] + bytes(10**7))
+    with serve(mirror) as server:
+        errors = fetch(
+            files[:1], tmp_path / "data", server.url if over_http else mirror
+        )
+    assert "than the manifest says" in errors[NAMES[0]]
+    assert content_of(tmp_path / "data") == {}
+
+
 @pytest.mark.parametrize("text", ["nowhere", "ftp://host/data"])
 def test_a_mirror_is_a_folder_or_an_address(text):
     with pytest.raises(InputError, match=f"'{text}': --mirror takes a folder, or"):

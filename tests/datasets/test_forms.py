@@ -23,6 +23,7 @@ TABLES = {
     "semicolons": lambda text: text.replace(",", ";").encode(),
     "spaces behind commas": lambda text: text.replace(",", ", ").encode(),
     "blank lines at the end": lambda text: (text + "\n  \n\n").encode(),
+    "empty rows at the end": lambda text: f"{text},,,,,\n,,,,,\n".encode(),
     "quoted cells": lambda text: re.sub(r"([^,\n]+)", r'"\1"', text).encode(),
 }
 

@@ -95,6 +95,14 @@ def test_installed_dataset_is_listed_retargeted_and_simulated(package, tmp_path)
     assert played.returncode == 0, played.stderr
 
 
+def test_installed_dataset_that_breaks_is_named(package):
+    (package / "zoo.py").write_text("raise KeyError('no zoo')")
+    listing = run(package, "data", "list")
+    assert listing.returncode == 2
+    (sentence,) = listing.stderr.splitlines()
+    assert "installed dataset 'elephant' cannot be taken: KeyError" in sentence
+
+
 @pytest.fixture
 def known(monkeypatch):
     monkeypatch.setattr(registry, "DATASETS", dict(registry.DATASETS))
