@@ -206,7 +206,7 @@ def read_segments(data_dir: Path) -> list[Segment]:
             "loco-drake data fetch writes it."
         )
     sources = {dataset.folder: dataset.source for dataset in DATASETS.values()}
-    segments: dict[str, Segment] = {}
+    segments: list[Segment] = []
     lines: dict[str, int] = {}
     unknown = []
     for line, row in _numbered_rows(table):
@@ -227,16 +227,14 @@ def read_segments(data_dir: Path) -> list[Segment]:
                 fps=float(row["fps"]),
             )
         except InputError as error:
-            raise InputError(f"{table}: line {line} cannot be. {error}") from None
+            raise InputError(f"{table}: line {line} cannot be: {error}") from None
         except ValueError:
             raise InputError(
                 f"{table}: line {line} has frames or a rate that are not numbers."
             ) from None
-        if segment.name in segments:
-            raise InputError(
-                f"{table}: line {line} repeats line {lines[segment.name]}."
-            )
-        segments[segment.name], lines[segment.name] = segment, line
+        if (first := lines.setdefault(segment.name, line)) != line:
+            raise InputError(f"{table}: line {line} repeats line {first}.")
+        segments.append(segment)
     if unknown:
         text = (
             f"{table}: line {unknown[0]} is of another dataset than "
@@ -245,7 +243,7 @@ def read_segments(data_dir: Path) -> list[Segment]:
         if not segments:
             raise InputError(f"{text}, as are all.")
         logging.getLogger(__name__).warning("%s, and is left out.", text)
-    return list(segments.values())
+    return segments
 
 
 def one_format(segments: Iterable[Segment]) -> list[Segment]:
