@@ -12,6 +12,7 @@ from pathlib import Path
 import tyro
 from pydrake.geometry import Meshcat
 
+from loco_drake.evaluation.replay import dress
 from loco_drake.evaluation.rollout import Recorder
 from loco_drake.models.plant import PlantConfig
 from loco_drake.systems.scenario import GeneratedReference, Scenario, TrainedPolicy
@@ -33,9 +34,7 @@ def main(
 ) -> None:
     """Simulates until ``time`` and takes the picture."""
     meshcat = Meshcat()
-    for hidden in ("/Grid", "/Axes"):
-        meshcat.SetProperty(hidden, "visible", False)
-    meshcat.SetProperty("/Background", "top_color", [0.75, 0.83, 0.92])
+    dress(meshcat)
     scenario = Scenario(
         plant=PlantConfig(visual=True),
         reference=GeneratedReference(gait=gait, seed=seed),

@@ -20,6 +20,7 @@ from render_picture import take_picture
 from loco_drake.common.files import atomic_path
 from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments, select_labels
+from loco_drake.evaluation.replay import dress
 from loco_drake.models.ground import AddGround
 from loco_drake.models.robots import ROBOTS, AddRobotModel, get_robot
 from loco_drake.motion.motion import FPS, Motion
@@ -106,9 +107,7 @@ class Scene:
         self, points: np.ndarray, motions: list[Motion], frame: int, gap: float
     ) -> None:
         self.meshcat = Meshcat()
-        for hidden in ("/Grid", "/Axes"):
-            self.meshcat.SetProperty(hidden, "visible", False)
-        self.meshcat.SetProperty("/Background", "top_color", [0.75, 0.83, 0.92])
+        dress(self.meshcat)
         self._points = points
         for name, color in zip(NAMES, COLORS, strict=True):
             self.meshcat.SetObject(f"animal/{name}", Sphere(RADIUS), color)
