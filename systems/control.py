@@ -23,13 +23,9 @@ class RobotState(LeafSystem):
 
         name: RobotState
         input_ports:
-        - plant_state
+        - plant_state: [q, v] of the robot's model instance, size 13 + 2 J; m, rad, s
         output_ports:
-        - state
-
-    Ports:
-        plant_state: [q, v] of the robot's model instance, size 13 + 2 J; m, rad, s.
-        state: the same after :func:`unit_base`; all that looks at the robot takes this.
+        - state: the same after :func:`unit_base`; what looks at the robot takes this
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -68,15 +64,10 @@ class PlanState(_PlanFollower):
 
         name: PlanState
         input_ports:
-        - plan
+        - plan: a Plan
         output_ports:
-        - state
-        - path_time
-
-    Ports:
-        plan: a Plan.
-        state: [q, v] in the plant's order, size 13 + 2 J; m, rad, s.
-        path_time: seconds of motion as it was written, size 1.
+        - state: [q, v] in the plant's order, size 13 + 2 J; m, rad, s
+        - path_time: seconds of motion as it was written, size 1
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -105,17 +96,11 @@ class Observation(_PlanFollower):
 
         name: Observation
         input_ports:
-        - plan
-        - state
-        - action
+        - plan: a Plan
+        - state: [q, v] of the robot, as it is measured, size 13 + 2 J; m, rad, s
+        - action: the policy's, as it is being applied, size J
         output_ports:
-        - observation
-
-    Ports:
-        plan: a Plan.
-        state: [q, v] of the robot, as it is measured, size 13 + 2 J; m, rad, s.
-        action: the policy's, as it is being applied, size J.
-        observation: see OBSERVATION_LAYOUT, size OBSERVATION_SIZE.
+        - observation: see OBSERVATION_LAYOUT, size OBSERVATION_SIZE
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -146,13 +131,9 @@ class TrackingPolicy(LeafSystem):
 
         name: TrackingPolicy
         input_ports:
-        - observation
+        - observation: see OBSERVATION_LAYOUT, size OBSERVATION_SIZE
         output_ports:
-        - action
-
-    Ports:
-        observation: see OBSERVATION_LAYOUT, size OBSERVATION_SIZE.
-        action: in units of ACTION_SCALE, size 12.
+        - action: in units of ACTION_SCALE, size 12
 
     It has no state and no clock: :class:`JointTargets` decides when to sample it.
     """
@@ -182,17 +163,11 @@ class JointTargets(_PlanFollower):
 
         name: JointTargets
         input_ports:
-        - plan
-        - action
+        - plan: a Plan
+        - action: the policy's, in units of ACTION_SCALE, size J
         output_ports:
-        - desired_state
-        - action
-
-    Ports:
-        plan: a Plan.
-        action: the policy's, in units of ACTION_SCALE, size J.
-        desired_state: what the PD is sent, [q_d, 0], rad and rad/s, size 2 J.
-        action: the one that is being held, size J.
+        - desired_state: what the PD is sent, [q_d, 0], rad and rad/s, size 2 J
+        - action: the one that is being held, size J
 
     Every PLAN_DT it samples its inputs and sets :func:`joint_targets` of the action and
     of the plan's :func:`set_points` at t + PLAN_DT. The sampling is an unrestricted
@@ -232,15 +207,10 @@ class TrackingReward(_PlanFollower):
 
         name: TrackingReward
         input_ports:
-        - plan
-        - state
+        - plan: a Plan
+        - state: [q, v] of the robot, size 13 + 2 J; m, rad, s
         output_ports:
-        - reward_terms
-
-    Ports:
-        plan: a Plan.
-        state: [q, v] of the robot, size 13 + 2 J; m, rad, s.
-        reward_terms: weighted, see REWARD_TERMS, size 5.
+        - reward_terms: weighted, see REWARD_TERMS, size 5
     """
 
     def __init__(self, robot: Robot) -> None:

@@ -83,32 +83,20 @@ def MakeLocomotionDiagram(
 
         name: LocomotionDiagram
         input_ports:
-        - gait
-        - action
-        - desired_state
+        - gait: optional, of a generated reference: index into LABELS, size 1
+        - action: of ExternalAction only; in units of ACTION_SCALE, size J
+        - desired_state: of ExternalTargets only, which has but the last two outputs;
+          what the PD is sent, [q_d, 0], rad and rad/s, size 2 J
         output_ports:
-        - plan
-        - plan_state
-        - path_time
-        - observation
-        - action
-        - desired_state
-        - reward_terms
-        - state
-        - net_actuation
-
-    Ports:
-        gait: optional, of a generated reference: index into LABELS, size 1.
-        action: in of ExternalAction only; in units of ACTION_SCALE, size J.
-        desired_state: in of ExternalTargets only, which has none of the outputs but the
-            last two; what the PD is sent, [q_d, 0], rad and rad/s, size 2 J.
-        plan: the Plan that is followed.
-        plan_state: [q, v] that it wants now, size 13 + 2 J; m, rad, s.
-        path_time: seconds of motion as it was written, size 1.
-        observation: what the policy sees, see OBSERVATION_LAYOUT.
-        reward_terms: weighted, see REWARD_TERMS, size 5.
-        state: [q, v] of the robot, its quaternion of length one, size 13 + 2 J.
-        net_actuation: torques of the joints, Nm, size J.
+        - plan: the Plan that is followed
+        - plan_state: [q, v] that it wants now, size 13 + 2 J; m, rad, s
+        - path_time: seconds of motion as it was written, size 1
+        - observation: what the policy sees, see OBSERVATION_LAYOUT
+        - action: the one that is being held, size J
+        - desired_state: what the PD is sent, as above
+        - reward_terms: weighted, see REWARD_TERMS, size 5
+        - state: [q, v] of the robot, its quaternion of length one, size 13 + 2 J
+        - net_actuation: torques of the joints, Nm, size J
 
     The subsystems are named plant, scene_graph, robot_state, reference, smoother,
     observation, policy, joint_targets, plan_state and reward, and actuation, pushes and

@@ -69,14 +69,10 @@ class Actuation(DomainSystem):
 
         name: Actuation
         input_ports:
-        - desired_state
-        - state
+        - desired_state: for the PD as modelled, [q_d, 0], rad and rad/s, size 2 J
+        - state: [q, v] of the robot, size 13 + 2 J; m, rad, s
         output_ports:
-        - desired_state
-
-    Ports:
-        desired_state: of the PD, [q_d, 0], rad and rad/s, size 2 J, in and out.
-        state: [q, v] of the robot, size 13 + 2 J; m, rad, s.
+        - desired_state: for the plant's PD, the same
 
     *Latency.* Set-points come out n = latency / time_step steps of the physics after
     they came in: a step that begins at t uses those of t - n time_step, and until there
@@ -185,10 +181,7 @@ class Pushes(DomainSystem):
 
         name: Pushes
         output_ports:
-        - spatial_forces
-
-    Ports:
-        spatial_forces: list of ExternallyAppliedSpatialForce, N, expressed in W.
+        - spatial_forces: list of ExternallyAppliedSpatialForce, N, expressed in W
 
     A discrete plant samples them at the beginning of its steps: a push that begins and
     lasts whole steps gives the trunk exactly the impulse force times duration.
@@ -227,12 +220,9 @@ class Sensors(DomainSystem):
 
         name: Sensors
         input_ports:
-        - state
+        - state: [q, v] of the robot, size 13 + 2 J; m, rad, s
         output_ports:
-        - state
-
-    Ports:
-        state: [q, v] of the robot, as it is and as it is measured; size 13 + 2 J.
+        - state: the same as it is measured
     """
 
     def __init__(self, robot: Robot) -> None:

@@ -26,7 +26,7 @@ class KeypointVisualizer(LeafSystem):
 
         name: KeypointVisualizer
         input_ports:
-        - plan
+        - plan: a Plan
 
     Front toes are blue, rear toes red, withers and hip green. Withers and hip are drawn
     above the robot's front and rear hip joints.

@@ -14,7 +14,7 @@ class PlanPlayer(LeafSystem):
 
         name: PlanPlayer
         output_ports:
-        - plan
+        - plan: a Plan
 
     The plan is an abstract parameter: fixed while the clock runs, chosen anew for each
     episode with :meth:`SetPlan`.

@@ -49,18 +49,13 @@ class ReferenceGenerator(LeafSystem):
 
         name: ReferenceGenerator
         input_ports:
-        - gait (optional)
-        - path_time (optional)
+        - gait: index into LABELS, size 1
+        - path_time: seconds of the plan that have been used up, size 1
         output_ports:
-        - plan
+        - plan: a Plan, open-ended
 
-    Ports:
-        gait: index into LABELS, size 1.
-        path_time: seconds of the plan that have been used up, size 1.
-        plan: a Plan, open-ended.
-
-    ``path_time`` (s) is how much of the plan has been used up: what the smoother has
-    committed; if it is not connected, the context's time. The configured gait may be a
+    ``path_time`` is what the smoother has committed; if it is not connected, the
+    context's time. The configured gait may be a
     schedule, whose times are on the plan's clock and are kept to a token. ``gait`` is
     an index into :data:`loco_drake.motion.gaits.LABELS` that overrides it for the
     chunks still to be written, so that a change comes ``horizon`` and up to a chunk
@@ -108,13 +103,21 @@ class ReferenceGenerator(LeafSystem):
     def SetReference(
         self, context: Context, *, gait: str | None = None, seed: int | None = None
     ) -> None:
-        """Begins anew, from plan time 0; see :func:`.simulator.StartEpisode`.
+        """Begins anew, at time 0; see :func:`.simulator.StartEpisode`.
 
         Args:
             context: this system's own.
             gait: a gait label, or a schedule of several; by default the configured one.
             seed: what the tokens are drawn with; by default the configured one.
+
+        Raises:
+            InputError: if they cannot be, or the context is at another time.
         """
+        if context.get_time() != 0:
+            raise InputError(
+                "Generated motion begins at time 0: call StartEpisode(simulator, gait="
+                ", seed=), or change the gait on the way by the input port gait."
+            )
         config = replace(
             self._config,
             gait=self._config.gait if gait is None else gait,

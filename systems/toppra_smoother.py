@@ -20,15 +20,11 @@ class ToppraSmoother(LeafSystem):
 
         name: ToppraSmoother
         input_ports:
-        - plan
+        - plan: a Plan as it was written
         output_ports:
-        - plan
-        - path_time
-
-    Ports:
-        plan: a Plan, in as it was written, out as it is to be played.
-        path_time: how much of the input has been used up, s, size 1; tells the
-            producer when to write more.
+        - plan: a Plan as it is to be played
+        - path_time: how much of the input has been used up, s, size 1; tells the
+          producer when to write more
 
     The output plan runs on the context's clock and is never faster than the input;
     it grows by chunks as the clock comes near its end and the input reaches far
