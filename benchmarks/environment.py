@@ -26,11 +26,11 @@ from pydrake.systems.framework import DiagramBuilder
 
 from loco_drake.cli.output import write_json
 from loco_drake.control.action import set_points
-from loco_drake.control.fall import has_fallen
 from loco_drake.control.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.control.plan import PLAN_DT, Plan, plan_from_motion
 from loco_drake.control.retiming import path_limits, smooth_plan
 from loco_drake.control.reward import reward_terms
+from loco_drake.control.state import has_fallen
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.plant import AddRobotPlant, ConfigureSimulator, PlantConfig

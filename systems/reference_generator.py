@@ -103,7 +103,7 @@ class ReferenceGenerator(LeafSystem):
     def SetReference(
         self, context: Context, *, gait: str | None = None, seed: int | None = None
     ) -> None:
-        """Begins anew, at time 0; see :func:`.simulator.StartEpisode`.
+        """Begins anew, from plan time 0; see :func:`.simulator.StartEpisode`.
 
         Args:
             context: this system's own.
@@ -111,13 +111,8 @@ class ReferenceGenerator(LeafSystem):
             seed: what the tokens are drawn with; by default the configured one.
 
         Raises:
-            InputError: if they cannot be, or the context is at another time.
+            InputError: if they cannot be.
         """
-        if context.get_time() != 0:
-            raise InputError(
-                "Generated motion begins at time 0: call StartEpisode(simulator, gait="
-                ", seed=), or change the gait on the way by the input port gait."
-            )
         config = replace(
             self._config,
             gait=self._config.gait if gait is None else gait,

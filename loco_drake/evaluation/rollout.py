@@ -9,9 +9,8 @@ from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Context, DiagramBuilder, EventStatus
 from pydrake.systems.primitives import LogVectorOutput
 
-from loco_drake.control.fall import has_fallen
 from loco_drake.control.plan import PLAN_DT
-from loco_drake.control.state import unit_base
+from loco_drake.control.state import has_fallen, unit_base
 from loco_drake.evaluation.tracking import Rollout
 from loco_drake.systems.diagram import AddLocomotion
 from loco_drake.systems.scenario import Scenario

@@ -6,12 +6,11 @@ from numpy.typing import NDArray
 from loco_drake.common.rotations import quat_to_matrix
 from loco_drake.control.action import joint_targets, set_points
 from loco_drake.control.domain import Domain
-from loco_drake.control.fall import has_fallen
 from loco_drake.control.measurement import draw_error, measure
 from loco_drake.control.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.reward import reward_terms
-from loco_drake.control.state import ORIENTATION, POSITION, split, unit_base
+from loco_drake.control.state import ORIENTATION, POSITION, has_fallen, split, unit_base
 from loco_drake.models.robots import get_robot
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.physics import make_worlds

@@ -16,9 +16,10 @@ from loco_drake.control.actor import (
     OBSERVATION_CLIP,
     Actor,
     ActorConfig,
+    mirror_actions,
+    mirror_observations,
     unprivileged_mask,
 )
-from loco_drake.control.symmetry import mirror_actions, mirror_observations
 from loco_drake.tracking.config import PpoConfig
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from loco_drake.control.fall import has_fallen
+from loco_drake.control.state import has_fallen
 
 
 def q_at(height, axis="x", degrees=0.0):

@@ -15,6 +15,7 @@ from loco_drake.control.domain import Domain
 from loco_drake.control.plan import PLAN_DT, plan_from_motion
 from loco_drake.control.state import split, unit_base
 from loco_drake.models.plant import CONTACTS, PlantConfig
+from loco_drake.motion.gaits import parse_label
 from loco_drake.systems.diagram import AddLocomotion, MakeLocomotionDiagram
 from loco_drake.systems.domain import SetDomain
 from loco_drake.systems.scenario import (
@@ -97,6 +98,24 @@ def test_a_plan_that_is_set_on_the_way_is_followed(trot, pace, smoother):
     q = plan.q[plan.index(0.6)]
     assert np.abs(pace.q - q).max(axis=1).min() < 1e-9
     assert np.abs(trot.q - q).max(axis=1).min() > 0.1
+
+
+def test_another_motion_that_is_generated_on_the_way_is_followed():
+    """The smoother, which had gone on for seconds, begins it too."""
+    scenario = Scenario(reference=GeneratedReference(gait="dog-pace", seed=1))
+    diagram = MakeLocomotionDiagram(scenario)
+    simulator = MakeSimulator(diagram, scenario)
+    StartEpisode(simulator)
+    simulator.AdvanceTo(1.0)
+    context = simulator.get_mutable_context()
+    reference = diagram.GetSubsystemByName("reference")
+    own = reference.GetMyMutableContextFromRoot(context)
+    reference.SetReference(own, gait="horse-walk", seed=2)
+    simulator.AdvanceTo(1.4)
+    plan = diagram.GetOutputPort("plan").Eval(context)
+    ahead = plan.labels[plan.index(1.4) : plan.index(2.2)]
+    assert (ahead == parse_label("horse-walk").index).all()
+    assert plan.end_time > 2.2
 
 
 def test_what_the_reference_cannot_take_is_refused(played):

@@ -10,10 +10,11 @@ from loco_drake.control.actor import (
     Actor,
     ActorConfig,
     load_actor,
+    mirror_actions,
+    mirror_observations,
     save_actor,
 )
 from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
-from loco_drake.control.symmetry import mirror_actions, mirror_observations
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.control import TrackingPolicy
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import torch
 
+from loco_drake.control.actor import mirror_actions, mirror_observations
 from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
-from loco_drake.control.symmetry import mirror_actions, mirror_observations
 from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
 from loco_drake.tracking.ppo import SymmetricPolicy, SymmetricStatistics
 

@@ -9,9 +9,8 @@ import torch
 from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import read_checkpoint
 from loco_drake.common.weights import load_weights, save_weights
-from loco_drake.control.actor import load_actor
+from loco_drake.control.actor import load_actor, mirror_actions, mirror_observations
 from loco_drake.control.observation import OBSERVATION_SIZE
-from loco_drake.control.symmetry import mirror_actions, mirror_observations
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
 from loco_drake.tracking.config import EnvironmentConfig, PpoConfig, TrainingConfig

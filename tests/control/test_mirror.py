@@ -4,10 +4,14 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.control.actor import Actor, ActorConfig
+from loco_drake.control.actor import (
+    Actor,
+    ActorConfig,
+    mirror_actions,
+    mirror_observations,
+)
 from loco_drake.control.observation import OBSERVATION_SIZE, observe, preview
 from loco_drake.control.plan import plan_from_motion
-from loco_drake.control.symmetry import mirror_actions, mirror_observations
 from loco_drake.models.legs import (
     MIRROR_AXIAL,
     MIRROR_JOINT_SIGNS,
