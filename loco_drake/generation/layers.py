@@ -17,22 +17,18 @@ class CausalConv(nn.Module):
         inputs: input channels.
         outputs: output channels.
         kernel: taps.
-        dilation: distance between taps.
     """
 
-    def __init__(
-        self, inputs: int, outputs: int, kernel: int, dilation: int = 1
-    ) -> None:
+    def __init__(self, inputs: int, outputs: int, kernel: int) -> None:
         super().__init__()
-        self.reach = (kernel - 1) * dilation  # times before the present that count
-        self.dilation = dilation
+        self.reach = kernel - 1  # times before the present that count
         self.linear = nn.Linear(inputs * kernel, outputs)
 
     def forward(self, x: Tensor) -> Tensor:
         """Maps (B, T, inputs) to (B, T, outputs)."""
         time = x.shape[1]
         x = functional.pad(x, (0, 0, self.reach, 0))
-        taps = [x[:, i : i + time] for i in range(0, self.reach + 1, self.dilation)]
+        taps = [x[:, i : i + time] for i in range(self.reach + 1)]
         out: Tensor = self.linear(torch.cat(taps, dim=-1))
         return out
 
@@ -43,13 +39,12 @@ class ConvBlock(nn.Module):
     Args:
         width: channels.
         kernel: taps of the convolution.
-        dilation: distance between taps.
     """
 
-    def __init__(self, width: int, kernel: int = 3, dilation: int = 1) -> None:
+    def __init__(self, width: int, kernel: int = 3) -> None:
         super().__init__()
         self.norm = nn.LayerNorm(width)
-        self.conv = CausalConv(width, width, kernel, dilation=dilation)
+        self.conv = CausalConv(width, width, kernel)
         self.reach = self.conv.reach
         self.out = nn.Linear(width, width)
 
@@ -100,9 +95,9 @@ class RotaryAttention(nn.Module):
         q, k = turn_channels(qkv[:2], angles.cos(), angles.sin())
         v = qkv[2]
         if past is not None:
+            if time > 1:
+                raise ValueError("with a past, times come one by one")
             k, v = torch.cat((past[0], k), dim=2), torch.cat((past[1], v), dim=2)
-        if past is not None and time > 1:
-            raise ValueError("with a past, times come one by one")
         attended = functional.scaled_dot_product_attention(
             q,
             k,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from loco_drake.common.determinism import single_thread, uniforms
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import quat_error
+from loco_drake.generation.features import rotate_plane
 from loco_drake.generation.footing import Footing, start_footing, step_footing
 from loco_drake.generation.generator import Generator, duration_bin, load_generator
 from loco_drake.generation.speed_rank import drawn_rank, rank_bin
@@ -38,8 +39,7 @@ class Stream:
     Attributes:
         seeds: of each motion, shape (B,).
         duration: how long each is to last, in s, shape (B,).
-        speed_rank: of each, in [0, 1], see :mod:`loco_drake.generation.speed_rank`,
-            shape (B,).
+        speed_rank: of each, in [0, 1], see :mod:`.speed_rank`, shape (B,).
         chunk: how many times the stream was extended.
         tokens: the latest ones, shape (B, n, codebooks).
         labels: of ``tokens``, index into gaits.LABELS, shape (B, n).
@@ -300,13 +300,14 @@ class MotionModel:
         """Plays the frames before the first so that the last is at the start pose.
 
         Returns:
-            Footing, q of the last two frames (B, 2, 19), contacts of the last
-            (B, 1, 4).
+            Footing; q of the last two frames, (B, 2, 19); contacts of the last.
         """
         there, _, _ = step_footing(
             self.robot, start_footing(np.zeros_like(footing.pose)), features
         )
-        start = _compose(footing.pose, _inverse(there.pose))
+        turn = footing.pose[:, 2] - there.pose[:, 2]
+        xy = footing.pose[:, :2] - rotate_plane(there.pose[:, :2], turn)
+        start = np.concatenate((xy, turn[:, None]), axis=-1)
         after, q, contacts = step_footing(self.robot, start_footing(start), features)
         return after, q[:, -2:], contacts[:, -1:]
 
@@ -335,22 +336,6 @@ def _velocities(q: Array) -> Array:
     turning = quat_error(q[:, :-2, :4], q[:, 2:, :4])
     moving = q[:, 2:, 4:] - q[:, :-2, 4:]
     return np.concatenate((turning, moving), axis=-1) * (FPS / 2)
-
-
-def _compose(a: Array, b: Array) -> Array:
-    """Returns the pose b, given relative to a, in the frame of a; shapes (B, 3)."""
-    cos, sin = np.cos(a[:, 2]), np.sin(a[:, 2])
-    x = a[:, 0] + cos * b[:, 0] - sin * b[:, 1]
-    y = a[:, 1] + sin * b[:, 0] + cos * b[:, 1]
-    return np.stack((x, y, a[:, 2] + b[:, 2]), axis=-1)
-
-
-def _inverse(a: Array) -> Array:
-    """Returns the inverse of plane poses (B, 3)."""
-    cos, sin = np.cos(a[:, 2]), np.sin(a[:, 2])
-    x = -cos * a[:, 0] - sin * a[:, 1]
-    y = sin * a[:, 0] - cos * a[:, 1]
-    return np.stack((x, y, -a[:, 2]), axis=-1)
 
 
 @lru_cache

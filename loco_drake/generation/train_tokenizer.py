@@ -6,7 +6,7 @@ vector-quantize-pytorch. The finest codebooks are left out at random, so that th
 decoder makes the best of the coarse ones alone.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -140,18 +140,8 @@ class LearningTokenizer(nn.Module):
         return self.tokenizer.eval()
 
 
-def residual_tokenizer(config: TokenizerConfig) -> LearningTokenizer:
-    """Returns the networks, untrained, that are trained by default."""
-    return LearningTokenizer(Tokenizer(config))
-
-
 def train_tokenizer(
-    library: Library,
-    config: TokenizerConfig,
-    settings: LoopSettings,
-    *,
-    weights: Mapping[str, float] = WEIGHTS,
-    build: Callable[[TokenizerConfig], LearningTokenizer] = residual_tokenizer,
+    library: Library, config: TokenizerConfig, settings: LoopSettings
 ) -> tuple[Tokenizer, LoopResult]:
     """Trains a tokenizer and writes ``tokenizer.safetensors`` if it was not stopped.
 
@@ -159,8 +149,6 @@ def train_tokenizer(
         library: what to learn from.
         config: sizes of the networks.
         settings: of the training.
-        weights: of the losses, by the names in :data:`WEIGHTS`.
-        build: makes the networks.
 
     Raises:
         InputError: if no clip is as long as a window, or a robot of the library is
@@ -174,7 +162,7 @@ def train_tokenizer(
         raise InputError(f"The tokenizer is not to know {', '.join(missing)}.")
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
-        learning = build(config)
+        learning = LearningTokenizer(Tokenizer(config))
     with torch.no_grad():
         # To begin with a still picture: first to unlearn jitter kills most codes.
         learning.tokenizer.decoder_out.weight.mul_(0.01)
@@ -188,13 +176,13 @@ def train_tokenizer(
         target, robot, label = windows(random, BATCH)
         losses = tokenizer_losses(learning, toes, scales(label), target, robot, BATCH)
         total = sum(
-            (weights[name] * loss for name, loss in losses.items()), torch.zeros(())
+            (WEIGHTS[name] * loss for name, loss in losses.items()), torch.zeros(())
         )
         return total, {name: loss.item() for name, loss in losses.items()}
 
     run = {
         "network": asdict(config),
-        "weights": dict(weights),
+        "weights": WEIGHTS,
         "motions": library.summary,
     }
     result = train("tokenizer", learning, loss_of_batch, settings, run)
