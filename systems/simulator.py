@@ -52,6 +52,12 @@ class LocomotionSimulator(Simulator):
     ) -> SimulatorStatus:
         """Advances to ``boundary_time``, s, or until a monitor ends the simulation."""
         context = self.get_mutable_context()
+        if not boundary_time >= context.get_time():
+            # Drake would end the process.
+            raise InputError(
+                f"The simulation is at {context.get_time():g} s already, and cannot "
+                f"advance to {boundary_time:g} s."
+            )
         while True:
             period = math.floor(context.get_time() / PLAN_DT + _TOLERANCE) + 1
             until = min(period * PLAN_DT, boundary_time)

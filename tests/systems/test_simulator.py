@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction
 from pydrake.multibody.tree import SpatialInertia, UnitInertia
 from pydrake.systems.analysis import Simulator, SimulatorConfig
-from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from pydrake.systems.framework import DiagramBuilder, EventStatus, LeafSystem
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import quat_multiply, quat_to_matrix
@@ -282,8 +282,6 @@ def test_a_scaled_quaternion_is_the_same_rotation(trot, scale):
 
 def test_a_monitor_still_ends_the_simulation(played, trot):
     """At the step at which it says so, not at the end of the control period."""
-    from pydrake.systems.framework import EventStatus
-
     simulator = MakeSimulator(played, PLAYED)
     StartEpisode(simulator, plan=trot)
 
@@ -295,6 +293,9 @@ def test_a_monitor_still_ends_the_simulation(played, trot):
     simulator.set_monitor(monitor)
     status = simulator.AdvanceTo(1.0)
     assert "enough" in status.FormatMessage()
+    for time in (np.nan, 0.01):
+        with pytest.raises(InputError, match=r"at 0.05 s already, and cannot"):
+            simulator.AdvanceTo(time)
     assert simulator.get_context().get_time() == pytest.approx(0.05)
 
 
