@@ -84,7 +84,9 @@ def check_conventions(motion: Motion) -> None:
     if not 1 <= motion.fps <= 1000:
         raise InputError(f"Its rate must be 1 to 1000 frames/s, not {motion.fps:g}.")
     if (far := np.abs(motion.base_position).max()) > MAX_DISTANCE:
-        raise InputError(f"Its base is {far:.3g} m from the origin; are these metres?")
+        raise InputError(
+            f"Its base is {far:.3g} m from the origin, which must be in metres."
+        )
     robot = get_robot(motion.robot) if motion.robot in ROBOTS else None
     if robot is not None:
         _check_joints(motion, robot)
@@ -132,7 +134,7 @@ def _check_speeds(
         if (np.abs(values) > bound).any():
             raise InputError(
                 f"{what} at {np.abs(values).max():.3g} {unit}, but no more than "
-                f"{np.max(bound):.3g} {unit} is plausible; are units and rate right?"
+                f"{np.max(bound):.3g} {unit} is plausible; check units and rate."
             )
 
 

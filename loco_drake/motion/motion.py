@@ -167,6 +167,7 @@ def make_motion(
 def _check(motion: Motion) -> None:
     """Raises InputError, in one sentence, unless ``motion`` is sound."""
     check_name("robot", motion.robot)
+    GaitLabel(motion.source, motion.gait)  # checks the names
     starts = [start for start, _ in motion.gait_changes]
     if starts and (starts[0] != 0 or sorted(set(starts)) != starts):
         raise InputError("The gaits of a motion must begin at rising frames from 0 on.")

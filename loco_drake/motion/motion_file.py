@@ -19,6 +19,7 @@ from loco_drake.motion.motion import UNITS, Motion
 SCHEMA_VERSION = 1
 MAX_BYTES = 512 * 2**20  # of a file, and of its arrays once unpacked
 _MAX_HEADER_BYTES = 4 * 2**20
+_FLOATS = (("f", 4), ("f", 8))
 
 
 def save_motion(motion: Motion, path: Path) -> None:
@@ -115,7 +116,7 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[Any]:
             raise ValueError("not of the size that it declares")
     if dtype.kind == "b" and size and max(data) > 1:
         raise ValueError("neither true nor false")
-    if dtype not in (np.float32, np.float64) and dtype.kind not in "bU":
+    if dtype.kind not in "bU" and (dtype.kind, dtype.itemsize) not in _FLOATS:
         raise InputError(
             f"The {info.filename.removesuffix('.npy')} of a motion must be floating "
             f"point of 32 or 64 bits, not {dtype}."
@@ -134,7 +135,7 @@ def _array_header(member: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[An
 def _make(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Motion:
     """Returns the motion that a file describes."""
     version = header.get("schema_version")
-    if not isinstance(version, int) or version < 1:
+    if type(version) is not int or version < 1:
         raise InputError("It has a damaged Motion header.")
     if version > SCHEMA_VERSION:
         raise InputError(
@@ -149,7 +150,7 @@ def _make(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Motion:
     texts = [header[name] for name in ("robot", "source", "gait")]
     joint_names, provenance = header["joint_names"], header.get("provenance", {})
     sound = (
-        isinstance(header["fps"], int | float)
+        type(header["fps"]) in (int, float)
         and isinstance(units, dict)
         and isinstance(joint_names, list)
         and isinstance(provenance, dict)
