@@ -9,6 +9,7 @@ another of like proportions.
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import quat_conjugate, quat_multiply, yaw_of, yaw_quat
 from loco_drake.models.robots import Robot
 from loco_drake.motion.motion import FPS, Motion
@@ -32,12 +33,12 @@ def motion_features(robot: Robot, motion: Motion) -> Array:
     second.
 
     Raises:
-        ValueError: if the motion is of another robot or not at FPS.
+        InputError: if the motion is of another robot or not at FPS.
     """
     if motion.robot != robot.name:
-        raise ValueError(f"the motion is of {motion.robot}, not of {robot.name}")
+        raise InputError(f"The motion is of {motion.robot}, not of {robot.name}.")
     if motion.fps != FPS:
-        raise ValueError(f"the motion is at {motion.fps} frames/s, not at {FPS}")
+        raise InputError(f"The motion is at {motion.fps:g} frames/s, not at {FPS:g}.")
     yaw = np.unwrap(yaw_of(motion.base_quaternion))
     turn = np.diff(yaw)
     step = np.diff(motion.base_position[:, :2], axis=0)

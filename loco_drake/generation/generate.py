@@ -118,11 +118,18 @@ def generate_motion(
 
 
 def check_duration(duration: float) -> None:
-    """Raises InputError unless ``duration`` is in (0, LONGEST_DURATION] s."""
+    """Raises InputError unless ``duration`` is in (0, LONGEST_DURATION] s.
+
+    A motion has three frames at least, of which velocities can be told.
+    """
     if not (np.isfinite(duration) and 0 < duration <= LONGEST_DURATION):
         raise InputError(
             f"The duration must be above 0 and at most {LONGEST_DURATION:g} s, "
             f"not {duration:g}."
+        )
+    if round(duration * FPS) < 2:
+        raise InputError(
+            f"The duration must be {2 / FPS:g} s or more, not {duration:g}."
         )
 
 

@@ -100,7 +100,10 @@ def load_library(*folders: Path) -> Library:
         )
     train, mirrors, held_out = [], [], []
     for path, motion in motions:
-        clip = motion_clip(motion, str(path))
+        try:
+            clip = motion_clip(motion, str(path))
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
         if motion.provenance.get("split") == VALIDATION:
             held_out.append(clip)
         else:

@@ -61,7 +61,6 @@ def in_robot_order(motion: Motion) -> Motion:
             + (f", not {quoted(foreign[0])}." if foreign else ".")
         )
     order = [motion.joint_names.index(name) for name in names]
-    legs = dict.fromkeys(name.split("_")[0] for name in motion.joint_names)
     return replace(
         motion,
         joint_names=names,
@@ -69,7 +68,7 @@ def in_robot_order(motion: Motion) -> Motion:
         joint_velocities=motion.joint_velocities[:, order],
         provenance={
             **motion.provenance,
-            "joints": f"reordered from {', '.join(legs)} to {', '.join(LEGS)}",
+            "joints": f"reordered from {', '.join(motion.joint_names)}",
         },
     )
 

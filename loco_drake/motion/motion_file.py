@@ -68,8 +68,7 @@ def load_motion(path: Path) -> Motion:
         motion = _make(header, arrays)
         if claimed not in (None, _content_sha256(header, arrays)):
             raise InputError("It is damaged: it was written with other content.")
-        motion = in_robot_order(motion)
-        check_conventions(motion)
+        check_conventions(ordered := in_robot_order(motion))
     except InputError as error:
         named = str(path) in str(error)
         raise InputError(str(error) if named else f"{path}: {error}") from None
@@ -77,9 +76,9 @@ def load_motion(path: Path) -> Motion:
         raise InputError(
             f"{path} is not a Motion file: it must be an .npz with a JSON header."
         ) from None
-    if "joints" in motion.provenance:
-        print(f"{path}: joints {motion.provenance['joints']}.", file=sys.stderr)
-    return motion
+    if ordered is not motion:
+        print(f"{path}: joints {ordered.provenance['joints']}.", file=sys.stderr)
+    return ordered
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:

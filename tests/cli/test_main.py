@@ -119,6 +119,7 @@ WRONG = {
     "generate --duration nan": DURATION,
     "generate --duration 0": DURATION,
     "generate --duration -2": DURATION,
+    "generate --duration 0.01": "The duration must be 0.04 s or more, not 0.01",
     "generate --duration 7200": "above 0 and at most 600 s, not 7200",
     "generate --temperature -1": "temperature must be 0 or more",
     "generate --top-p 0": "top_p must be above 0 and at most 1",

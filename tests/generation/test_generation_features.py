@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from loco_drake.common.errors import InputError
 from loco_drake.generation import features as ft
 from loco_drake.models.robots import get_robot
 
@@ -67,7 +68,7 @@ def test_integration_goes_on_where_it_stopped(make_synthetic):
 
 
 def test_motion_of_another_robot_is_refused(make_synthetic):
-    with pytest.raises(ValueError, match="not of a1"):
+    with pytest.raises(InputError, match="not of a1"):
         ft.motion_features(get_robot("a1"), make_synthetic())
 
 
