@@ -246,7 +246,10 @@ def test_motions_that_cannot_be_scored(recordings, recorded, tmp_path):
     with pytest.raises(InputError, match="no Motion files"):
         EvaluateGeneration(**options).run()
     path = tmp_path / "motions" / "a.npz"
-    save_motion(replace(recorded.train[0], fps=60.0), path)
+    motion = recorded.train[0]
+    names = ("base_velocity", "base_angular_velocity", "joint_velocities")
+    faster = {name: 1.2 * getattr(motion, name) for name in names}
+    save_motion(replace(motion, fps=60.0, **faster), path)
     with pytest.raises(InputError, match="must be at 50 frames/s"):
         EvaluateGeneration(**options).run()
     save_motion(recorded.train[0].slice(0, 60), path)
