@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar
+from statistics import fmean
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
-import numpy as np
 import tyro
 from rich.progress import (
     BarColumn,
@@ -17,12 +17,10 @@ from rich.progress import (
 from loco_drake.cli.output import print_table, write_results
 from loco_drake.cli.training import print_stopped
 from loco_drake.common.errors import InputError, check_at_least
-from loco_drake.common.run_folder import check_folder, options_of
-from loco_drake.models.robots import get_robot
 from loco_drake.tracking.config import TrainingConfig
-from loco_drake.tracking.references import load_references
-from loco_drake.tracking.train import NAME, POLICY, train_tracker
-from loco_drake.tracking.train import Progress as TrainingProgress
+
+if TYPE_CHECKING:
+    from loco_drake.tracking.train import Progress as TrainingProgress
 
 
 @dataclass(kw_only=True)
@@ -32,7 +30,7 @@ class TrainTracker(TrainingConfig):
     Ctrl-C stops it; --resume goes on from the last update.
     """
 
-    NAME: ClassVar[str] = NAME
+    NAME: ClassVar[str] = "tracker"
     references: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
     """Folder of Motion files to follow, such as loco-drake generate writes. Required,
     but with --resume."""
@@ -51,6 +49,11 @@ class TrainTracker(TrainingConfig):
 
     def run(self) -> int:
         """Trains, prints and writes; returns the exit status."""
+        from loco_drake.common.run_folder import check_folder, options_of
+        from loco_drake.models.robots import get_robot
+        from loco_drake.tracking.references import load_references
+        from loco_drake.tracking.train import POLICY, train_tracker
+
         check_at_least("steps", self.steps, 1)
         environment = self.environment
         if self.randomize:
@@ -70,8 +73,8 @@ class TrainTracker(TrainingConfig):
         with bar:
             task = bar.add_task("steps", total=self.steps, score=0.0)
 
-            def report(progress: TrainingProgress) -> None:
-                score = float(np.mean(list(progress.scores.values())))
+            def report(progress: "TrainingProgress") -> None:
+                score = fmean(progress.scores.values())
                 bar.update(task, completed=progress.steps, score=score)
 
             figures = train_tracker(

@@ -165,6 +165,7 @@ def shipped(tmp_path_factory):
     return make(folder, "--replays", "dog-trot", "--replay-seconds", 1)
 
 
+@pytest.mark.slow
 def test_shipped_results_are_on_the_page(shipped):
     page, figures = shipped
     generation = json.loads((results_dir() / "generation.json").read_text())
@@ -183,6 +184,7 @@ def test_shipped_results_are_on_the_page(shipped):
     assert figures["goals"]["go2"]["measured"] == figures["goals"]["go2"]["goals"]
 
 
+@pytest.mark.slow
 def test_a_replay_can_be_put_together_from_the_page(shipped):
     page, figures = shipped
     assert "go2 dog-trot" in figures["replays"]

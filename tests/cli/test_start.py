@@ -23,15 +23,12 @@ finally:
 """
 
 
-LIGHT = [name for name in _COMMANDS if name != "train tracker"]
-
-
-@pytest.mark.parametrize("name", LIGHT)
+@pytest.mark.parametrize("name", _COMMANDS)
 def test_help_waits_for_no_slow_library(name, tmp_path):
     printed = run_python("-c", HELP, *name.split(), cwd=tmp_path)
     assert f"loco-drake {name}" in printed
     # Bounds of its worlds come from a robot's model, which takes .2 s.
-    drake = " pydrake" if name == "evaluate tracking" else ""
+    drake = " pydrake" if name in ("evaluate tracking", "train tracker") else ""
     assert printed.splitlines()[-1] == f"imported:{drake}"
 
 

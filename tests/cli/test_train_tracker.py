@@ -22,6 +22,7 @@ def train(references, *options):
     return main(["train", "tracker", "--references", str(references), *options])
 
 
+@pytest.mark.slow
 def test_options_reach_the_training(references, tmp_path, capsys):
     """One batch in randomized worlds, of a policy without privileged observations."""
     options = (

@@ -10,6 +10,8 @@ from tests.process import run_python
 SHOW = """
 import numpy as np, torch
 from threadpoolctl import threadpool_info
+
+pytestmark = pytest.mark.slow
 def show(x=None):
     pools = {pool["num_threads"] for pool in threadpool_info()}
     return torch.get_num_threads(), max(pools)
