@@ -48,6 +48,22 @@ def test_architecture_names_every_system_and_port_of_the_diagram():
     assert sorted(ports) == sorted(re.findall(r" p\d\(\[(\w+)\]\)", page))
 
 
+@pytest.mark.parametrize(
+    ("way", "bound"),
+    [
+        ("One clip, from file to torque", 25),
+        ("One token, to torque", 15),
+        ("One training step", 12),
+    ],
+)
+def test_architecture_lists_files_that_exist_each_once_and_few(way, bound):
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    section = page.split(f"### {way}\n")[1].split("\n#")[0]
+    files = re.findall(r"^\d+\. `(.+?)`: ", section, re.M)
+    assert 10 <= len(files) == len(set(files)) <= bound
+    assert [path for path in files if not (ROOT / path).is_file()] == []
+
+
 def test_retargeting_shows_the_robot_file_as_it_is():
     page = (ROOT / "docs" / "retargeting.md").read_text()
     (block,) = re.findall(r"^```yaml\n(.*?)^```$", page, re.M | re.S)
