@@ -151,8 +151,6 @@ def open_run(
 
 def check_folder(folder: Path, weights: str, resume: bool) -> None:
     """Raises InputError if a training cannot begin, or go on, in ``folder``."""
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"--out must be a folder, and {str(folder)!r} is none.")
     found = [file for file in (CHECKPOINT, weights) if (folder / file).exists()]
     if resume and CHECKPOINT not in found:
         raise InputError(

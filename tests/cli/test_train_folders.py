@@ -202,12 +202,3 @@ def test_a_full_disk_ends_training_in_one_sentence(kind, run_of):
     assert (out / CHECKPOINT).read_bytes() == before
     assert not list(out.glob(".*"))
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY
-
-
-def test_out_must_be_a_folder(made, tmp_path, capsys):
-    file = tmp_path / "file"
-    file.write_text("mine")
-    for kind in KINDS:
-        error = refused(capsys, train(kind, file, made[1][kind]))
-        assert "--out must be a folder" in error
-    assert file.read_text() == "mine"

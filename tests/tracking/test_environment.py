@@ -233,3 +233,9 @@ def test_references_must_be_there_and_of_the_robot(tmp_path):
     save_motion(synthetic_motion("dog-trot", 2.0), tmp_path / "trot.npz")
     with pytest.raises(InputError, match="of go2, not of a1"):
         load_references(get_robot("a1"), tmp_path)
+
+
+def test_all_environments_of_a_process_simulate_one_diagram(plans):
+    """Drake never frees a diagram that has systems in Python."""
+    first, second = (TrackingEnv(plans) for _ in range(2))
+    assert first._batch._worlds[0]._diagram is second._batch._worlds[0]._diagram
