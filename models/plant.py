@@ -25,19 +25,19 @@ CONTACTS = ("similar", "lagged", "sap", "cenic")
 # Not frozen: yaml_load_typed sets the fields one by one.
 @dataclass(kw_only=True)
 class PlantConfig:
-    """How to simulate a robot; docs/contact.md says why these are the defaults."""
+    """Contact model, time step and ground; docs/contact.md explains the defaults."""
 
-    # Step of the discrete plant in s; the longest step of "cenic".
+    # Time step of the discrete plant in s; with cenic, the longest step.
     time_step: float = 0.01
-    # Drake's contact approximation of the discrete plant, or "cenic" for a continuous
-    # plant whose integrator has error control; one of CONTACTS.
+    # Contact solver: similar, lagged or sap for a discrete plant, or cenic for a
+    # continuous plant with error control.
     contact: str = "similar"
     # Accuracy of the CENIC integrator.
     accuracy: float = 1e-3
-    # Coulomb friction of the ground. The feet have .8, and the coefficient of a contact
-    # is the harmonic mean of the two.
+    # Coulomb friction coefficient of the ground. A contact uses the harmonic mean with
+    # the feet's .8.
     friction: float = 0.8
-    # Whether to load meshes and a floor, for Meshcat.
+    # Load meshes and a floor for Meshcat.
     visual: bool = False
 
     def check(self) -> None:

@@ -16,14 +16,15 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class DataList:
-    """Lists the sources of motion: how much of each there is, and its licence."""
+    """List the sources of motion with duration, gaits and licence."""
 
     data_dir: Path | None = None
-    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
+    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache
+    folder."""
     json: Path | None = None
-    """Writes the figures of each source to this file."""
+    """Write the figures of each source to this JSON file."""
     seed: int = 0
-    """As in every command; nothing here is random."""
+    """Accepted by every command; this one uses no random numbers."""
 
     def run(self) -> int:
         """Prints the table; returns 0.
@@ -67,24 +68,24 @@ class DataList:
 
 @dataclass(kw_only=True)
 class DataInspect:
-    """Draws one stretch of a recording: toe heights, contacts, speeds."""
+    """Plot toe heights, contacts and speeds of one stretch of a recording."""
 
     file: tyro.conf.Positional[Path]
     """A recording."""
     source: str = "dog"
-    """Whose format it has: dog, horse, mpc or solo8."""
+    """Source whose format the file has: dog, horse, mpc or solo8."""
     start: int | None = None
-    """First frame, from 0, at the file's own rate. Default: the first of use."""
+    """First frame, counted from 0 at the file's rate. Default: the first usable one."""
     end: int | None = None
-    """Frame after the last. Default: the end of the file."""
+    """End frame, exclusive. Default: the end of the file."""
     fps: float | None = None
-    """Rate in frames/s. Default: what the format, the file's name or motion tells."""
+    """Rate in frames/s. Default: inferred from format, name or motion."""
     out: Path | None = None
-    """The picture, .png. Default: the recording's name in this folder."""
+    """PNG file to write. Default: the name of the recording, in the current folder."""
     json: Path | None = None
-    """Writes the figures to this file."""
+    """Write the figures to this JSON file."""
     seed: int = 0
-    """As in every command; nothing here is random."""
+    """Accepted by every command; this one uses no random numbers."""
 
     def run(self) -> int:
         """Writes the picture and prints the table; returns 0.

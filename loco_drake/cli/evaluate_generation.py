@@ -42,25 +42,25 @@ _COLUMNS = {
 
 @dataclass(kw_only=True)
 class EvaluateGeneration(Effort, Evaluation):
-    """Compares generated motion with recorded motion.
+    """Compare generated motion with recorded motion.
 
-    Can gaits be told apart (Table 1 of the paper), can generated be told from recorded
-    motion, is it new, do feet slip or sink, is it as smooth and as fast, does it drift?
-    docs/generation.md defines each figure.
+    Measures gait recognition (Table 1 of the paper), two-sample accuracy, novelty,
+    slip, penetration, jerk, speed and drift, as defined in docs/generation.md.
     """
 
     KEYS = ("classifiers", "two_sample_accuracy", *_FIGURES, "labels", "all")
 
     motions: Path | None = None
-    """Scores the Motion files in this folder instead of generating."""
+    """Score the Motion files in this folder instead of generating motion."""
     tokenizer: Path | None = None
-    """Weights from `train tokenizer`. Default: those that come with the package."""
+    """Weights from `train tokenizer`. Default: the shipped weights."""
     generator: Path | None = None
-    """Weights from `train generator`. Default: those that come with the package."""
+    """Weights from `train generator`. Default: the shipped weights."""
     figures: Path | None = None
-    """Writes pictures to this folder."""
+    """Folder for plots."""
     seed: int = 0
-    """Of the first motion and the first classifier; each further one has the next."""
+    """Seed of the first motion and the first classifier; it increases by 1 for each
+    further one."""
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""

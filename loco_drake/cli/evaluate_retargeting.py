@@ -19,32 +19,33 @@ from loco_drake.common.errors import check_at_least, check_choice
 
 @dataclass(kw_only=True)
 class EvaluateRetargeting:
-    """Retargets stretches of segments.csv and says how well that went.
+    """Retarget the stretches in segments.csv and measure the result.
 
-    Slip, penetration, limits, errors of the toes, and how well the rhythm of the gait
-    is kept; docs/retargeting.md defines each figure. No Motion file is written.
+    Measures slip, penetration, joint limits, toe errors and gait timing, as defined in
+    docs/retargeting.md. Writes no Motion files.
     """
 
     robot: str = "go2"
-    """The robot: go2, a1, all (both), or the YAML file of another one."""
+    """Robot: go2, a1, all (both), or a YAML file that describes another robot."""
     labels: tuple[str, ...] = ()
-    """Such as dog-trot dog-pace. Default: all that segments.csv holds."""
+    """Gait labels, such as dog-trot dog-pace. Default: all in segments.csv."""
     mirror: bool = False
-    """Exchanges left and right."""
+    """Exchange left and right."""
     froude: bool = False
-    """Scales time for the animal's Froude number, as in loco-drake retarget."""
+    """Scale time to keep the animal's Froude number, as `retarget --froude` does."""
     data_dir: Path | None = None
-    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
+    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache
+    folder."""
     workers: int = 1
-    """Processes."""
+    """Number of worker processes."""
     seeds: int = 1
-    """As in every evaluation; retargeting is not random, so one seed says it all."""
+    """Accepted by every evaluation; retargeting is deterministic."""
     seed: int = 0
-    """As in every command; nothing here is random."""
+    """Accepted by every command; this one uses no random numbers."""
     strict: bool = False
-    """Exits with status 1 if a figure of a clip is outside its bound."""
+    """Exit with status 1 if a figure of a clip is outside its bounds."""
     json: Path | None = None
-    """Writes the figures to this file."""
+    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Prints a table for each robot; returns the exit status.

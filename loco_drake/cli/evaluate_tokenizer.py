@@ -11,23 +11,22 @@ from loco_drake.common.errors import InputError, check_at_least
 
 @dataclass(kw_only=True)
 class EvaluateTokenizer(Evaluation):
-    """Turns recordings into tokens and back, and says how well that went.
+    """Encode and decode held-out recordings and measure the reconstruction.
 
-    Errors of joints and toes on recordings that were held out from training, and how
-    much of the codebooks is used. docs/generation.md defines each figure. Nothing is
-    random: seeds change nothing.
+    Measures joint and toe errors and codebook usage, as defined in docs/generation.md.
+    The result is deterministic.
     """
 
     KEYS = ("labels", "all", "codebook_use")
 
     tokenizer: Path | None = None
-    """Weights from `train tokenizer`. Default: those that come with the package."""
+    """Weights from `train tokenizer`. Default: the shipped weights."""
     books: int | None = None
-    """Codebooks to decode from, the coarsest first. Default: all."""
+    """Number of codebooks to decode from, the coarsest first. Default: all."""
     figures: Path | None = None
-    """Writes a picture of the codes' use to this folder."""
+    """Folder for a plot of codebook usage."""
     seeds: int = 1
-    """As in every evaluation; a tokenizer is not random, so one seed says it all."""
+    """Accepted by every evaluation; a tokenizer is deterministic."""
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""

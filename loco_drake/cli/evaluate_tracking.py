@@ -36,41 +36,42 @@ _COLUMNS = {
 
 @dataclass(kw_only=True)
 class EvaluateTracking(Evaluation):
-    """Simulates many episodes and says how well the policy follows its references."""
+    """Simulate many episodes and measure how well a policy tracks its references."""
 
     labels: tuple[str, ...] = ()
-    """Such as dog-trot dog-pace. Default: those that the policy was trained on."""
+    """Gait labels, such as dog-trot dog-pace. Default: those that the policy was
+    trained on."""
     reference: str = "generated"
-    """generated: written by the generator while the simulation runs; or retargeted:
-    stretches of the recordings."""
+    """generated, during the simulation, or retargeted, from stretches of the
+    recordings."""
     seeds: int = 20
-    """Episodes of each label, at most; the first generated one has --seed."""
+    """Number of episodes per label, at most; seeds count up from --seed."""
     duration: float = 10.0
-    """Seconds of each episode; of a recording at most its length."""
+    """Length of each episode in s; at most the length of a recording."""
     policy: Path | None = None
-    """Weights of the policy, or the name of another shipped one, such as randomized.
-    Default: the robot's main one."""
+    """Weights of the policy, or the name of a shipped variant, such as randomized.
+    Default: the robot's main policy."""
     contact: str = "similar"
     """Contact solver: similar, lagged, sap or cenic."""
     time_step: float = 0.01
-    """Step of the physics, s."""
+    """Time step of the physics, s."""
     accuracy: float = 1e-4
-    """Of cenic, which controls its error."""
+    """Accuracy of the integrator of cenic."""
     friction: float = 0.8
-    """Friction of the ground."""
+    """Coulomb friction coefficient of the ground."""
     pushes: bool = False
-    """Push the trunk again and again, in directions drawn by the seed."""
+    """Push the trunk repeatedly in random directions."""
     push_size: float = 1.0
-    """With --pushes: the velocity that each would give the robot as a whole, m/s; its
-    mass times that is the impulse, spread over .1 s."""
+    """With --pushes: change of the robot's velocity by one push, m/s. The force lasts
+    .1 s."""
     push_interval: float = 2.0
-    """With --pushes: s from the start to the first, and from each to the next."""
+    """With --pushes: time from the start to the first push and between pushes, s."""
     randomize: bool = False
-    """Draw the world of each episode, as in training with --randomize."""
+    """Randomize the world of each episode, as `train tracker --randomize` does."""
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
-    """Single parts of it; a range is two numbers."""
+    """Ranges of single parts; a range is two numbers."""
     seed: int = 0
-    """Of the first generated reference of each label."""
+    """Seed of the first generated reference of each label."""
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""

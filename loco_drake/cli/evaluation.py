@@ -1,4 +1,4 @@
-"""What the ``evaluate`` commands share."""
+"""Options and steps that the ``evaluate`` commands share."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -20,23 +20,24 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class Evaluation:
-    """An evaluation of the two robots; KEYS are those of a robot's figures."""
+    """Base of the evaluations of Go2 and A1; KEYS are the keys of a robot's figures."""
 
     KEYS: ClassVar[tuple[str, ...]]
 
     robot: str = "go2"
-    """The robot: go2, a1 or all."""
+    """Robot: go2, a1 or all."""
     labels: tuple[str, ...] = ()
-    """Such as dog-trot dog-pace. Default: the fifteen, as far as there are recordings
-    of them."""
+    """Gait labels, such as dog-trot dog-pace. Default: all of the fifteen with
+    recordings."""
     data_dir: Path | None = None
-    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
+    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache
+    folder."""
     workers: int = 1
-    """Processes."""
+    """Number of worker processes."""
     seed: int = 0
-    """As in every command."""
+    """Accepted by every command; this one uses no random numbers."""
     json: Path | None = None
-    """Writes the figures to this file."""
+    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Prints tables for each robot and writes the figures; returns 0.

@@ -1,4 +1,4 @@
-"""``loco-drake export``: the policy as an ONNX file."""
+"""``loco-drake export``: writes a policy as an ONNX file."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,19 +12,19 @@ from loco_drake.common.errors import InputError
 
 @dataclass(kw_only=True)
 class Export:
-    """Write the policy as ONNX: from raw observations to actions, with all it needs."""
+    """Write a policy as ONNX, from raw observations to actions, with metadata."""
 
     robot: str = "go2"
     """Robot: go2 or a1."""
     policy: Path | None = None
-    """Weights of the policy, or the name of another shipped one, such as randomized;
-    default: the robot's main one."""
+    """Weights of the policy, or the name of a shipped variant, such as randomized.
+    Default: the robot's main policy."""
     out: Path = Path("policy.onnx")
-    """File to write."""
+    """ONNX file to write."""
     json: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """Write the metadata to a file."""
+    """Write the metadata to this JSON file."""
     seed: int = 0
-    """As in every command; nothing here is random."""
+    """Accepted by every command; this one uses no random numbers."""
 
     def run(self) -> int:
         """Writes and prints; returns the exit status."""

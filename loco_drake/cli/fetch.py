@@ -34,24 +34,25 @@ _LISTED_FAILURES = 10
 
 @dataclass(kw_only=True)
 class DataFetch:
-    """Downloads the recordings from where they are published, and checks each file.
+    """Download the recordings from their publishers and check each file.
 
-    Files that are there already are not fetched again: run it once more after a failure
-    or Ctrl-C. The stretches of segments.csv are written beside them; rows of your own
-    stay. The recordings are under licences of their own, which are printed first.
+    Prints the licences of the recordings first. Files that are complete are not
+    downloaded again, so the command can be repeated after a failure or Ctrl-C. Adds the
+    shipped rows to segments.csv and keeps your own.
     """
 
     source: tyro.conf.UseAppendAction[tuple[tuple[str, ...], ...]] = ()
-    """Whose recordings, such as dog; several are allowed. Default: all."""
+    """Sources to download, such as dog. Default: all."""
     data_dir: Path | None = None
-    """Folder for the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
+    """Folder for the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache
+    folder."""
     mirror: str | None = None
-    """Fetches from copies instead: a folder, or an http(s) address, laid out like the
-    data folder."""
+    """Download from a copy: a folder or an http(s) address with the layout of the data
+    folder."""
     json: Path | None = None
-    """Writes the figures of each source to this file."""
+    """Write the figures of each source to this JSON file."""
     seed: int = 0
-    """As in every command; nothing here is random."""
+    """Accepted by every command; this one uses no random numbers."""
 
     def run(self) -> int:
         """Fetches what is missing; returns 1 if a file failed, else 0.

@@ -15,34 +15,34 @@ BATCH = 32  # motions side by side
 
 @dataclass(kw_only=True)
 class Generate:
-    """Generates motions and writes them as Motion files, at 50 frames/s."""
+    """Generate motion of a gait and write Motion files at 50 frames/s."""
 
     gait: str = "dog-trot"
-    """Gait label SOURCE-GAIT, such as dog-pace; or several, the later ones with the
-    time in s at which they begin: dog-pace,dog-trot@3,dog-gallop@6."""
+    """Gait label, such as dog-pace, or a schedule of labels with start times in s, such
+    as dog-pace,dog-trot@3,dog-gallop@6."""
     duration: float = 10.0
     """Length of each motion in s, above 0 and at most 600."""
     count: int = 1
-    """How many motions."""
+    """Number of motions."""
     seed: int = 0
-    """Of the first motion; each further one has the next."""
+    """Seed of the first motion; it increases by 1 for each further motion."""
     robot: str = "go2"
-    """The robot: go2 or a1."""
+    """Robot: go2 or a1."""
     out: Path = Path("motions/generated")
     """Folder for the Motion files."""
     pace: float | None = None
-    """How fast, from 0, the slowest that the gait was recorded at, to 1, the fastest.
-    Default: each seed has a pace of its own."""
+    """Speed rank, from 0 (slowest recorded speed of the gait) to 1 (fastest). Default:
+    drawn for each seed."""
     temperature: float = 1.0
-    """Above 1 more varied, below 1 more typical, 0 always the likeliest."""
+    """Sampling temperature: above 1 more varied, below 1 more typical, 0 greedy."""
     top_p: float = 0.95
-    """Only the likeliest codes that together have this probability are drawn."""
+    """Sample from the likeliest codes that together have this probability."""
     tokenizer: Path | None = None
-    """Weights from `train tokenizer`. Default: those that come with the package."""
+    """Weights from `train tokenizer`. Default: the shipped weights."""
     generator: Path | None = None
-    """Weights from `train generator`. Default: those that come with the package."""
+    """Weights from `train generator`. Default: the shipped weights."""
     json: Path | None = None
-    """Writes the figures to this file."""
+    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Writes the files and prints the figures; returns 0.

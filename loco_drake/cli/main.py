@@ -14,66 +14,74 @@ from loco_drake.common.determinism import use_one_thread
 from loco_drake.common.errors import InputError, check_choice, one_line
 from loco_drake.common.files import check_writable
 
-# Command: module, class, what it does. A module is imported only when its command is
-# asked for: --help should not wait for torch and Drake.
+# Command: module, class, summary. Modules are imported on demand, so that --help does
+# not import torch and Drake.
 _COMMANDS = {
-    "simulate": ("simulate", "Simulate", "a robot does a gait, in physics"),
-    "generate": ("generate", "Generate", "write Motion files for a gait"),
-    "retarget": ("retarget", "Retarget", "recordings to Motion files of a robot"),
-    "data list": ("data", "DataList", "the sources of motion and their licences"),
-    "data fetch": ("fetch", "DataFetch", "download the recordings, checked"),
-    "data inspect": ("data", "DataInspect", "one stretch of a recording as a picture"),
-    "train tokenizer": ("train_tokenizer", "TrainTokenizer", "motion to tokens"),
+    "simulate": ("simulate", "Simulate", "simulate a robot that performs a gait"),
+    "generate": ("generate", "Generate", "generate motion and write Motion files"),
+    "retarget": ("retarget", "Retarget", "retarget recordings to a robot"),
+    "data list": ("data", "DataList", "list the sources of motion and their licences"),
+    "data fetch": ("fetch", "DataFetch", "download and check the recordings"),
+    "data inspect": ("data", "DataInspect", "plot one stretch of a recording"),
+    "train tokenizer": (
+        "train_tokenizer",
+        "TrainTokenizer",
+        "train the VQ-VAE that encodes motion",
+    ),
     "train generator": (
         "train_generator",
         "TrainGenerator",
-        "the GPT that writes them",
+        "train the GPT that generates tokens",
     ),
-    "train tracker": ("train_tracker", "TrainTracker", "the policy, by PPO"),
+    "train tracker": (
+        "train_tracker",
+        "TrainTracker",
+        "train the tracking policy with PPO",
+    ),
     "train classifier": (
         "train_classifier",
         "TrainClassifier",
-        "what tells gaits apart, to judge generated motion",
+        "train the transformer that classifies gaits",
     ),
-    "export": ("export", "Export", "the policy as ONNX"),
+    "export": ("export", "Export", "write a policy as ONNX"),
     "evaluate retargeting": (
         "evaluate_retargeting",
         "EvaluateRetargeting",
-        "how well recordings become motion of a robot",
+        "measure retargeted motion",
     ),
     "evaluate tokenizer": (
         "evaluate_tokenizer",
         "EvaluateTokenizer",
-        "how well motion survives the way to tokens and back",
+        "measure reconstruction by the tokenizer",
     ),
     "evaluate generation": (
         "evaluate_generation",
         "EvaluateGeneration",
-        "how generated motion compares with recorded motion",
+        "compare generated with recorded motion",
     ),
     "evaluate tracking": (
         "evaluate_tracking",
         "EvaluateTracking",
-        "how well the policy follows its references",
+        "measure how well a policy tracks",
     ),
-    "report": ("report", "Report", "one page of all results, beside the paper's"),
+    "report": ("report", "Report", "write one HTML page of all results"),
 }
 _HELP = ("-h", "--help")
-# Options that name what is written; it is found out before the work whether it can be.
+# Options that name an output. Whether it is writable is checked before the work.
 _OUTPUTS = ("json", "html", "out", "figures")
-_ONE_FILE = ("report", "export", "data inspect")  # whose --out is no folder
-# What Drake needs of a bare Debian or Ubuntu.
+_ONE_FILE = ("report", "export", "data inspect")  # --out is a file
+# Libraries that Drake needs and a bare Debian or Ubuntu lacks.
 _LIBRARIES = "libx11-6 libsm6 libglib2.0-0"
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs a command; returns its exit status.
+    """Runs a command and returns its exit status.
 
-    0 means done (a fall is a result), 1 that the work failed or was interrupted, 2
-    that the input was wrong, which one sentence on stderr explains.
+    The status is 0 on success, 1 if the work failed or was interrupted, and 2 if the
+    input was invalid. A robot that falls is a success.
 
     Args:
-        arguments: instead of those of the process.
+        arguments: the arguments; those of the process if None.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
     try:
@@ -91,7 +99,7 @@ def main(arguments: list[str] | None = None) -> int:
         module, class_name, _ = _COMMANDS[name]
         use_one_thread()
         command = getattr(import_module(f"loco_drake.cli.{module}"), class_name)
-        # A filter, for importing Drake sets the level anew.
+        # A filter, since importing Drake resets the level.
         logging.getLogger("drake").addFilter(_is_error)
         prog = f"loco-drake {name}"
         parsed: Any = tyro.cli(command, prog=prog, args=rest)
@@ -118,7 +126,7 @@ def main(arguments: list[str] | None = None) -> int:
         )
         return 1
     except OSError as error:
-        # A full disk, a folder that may not be written to: not this program's fault.
+        # Such as a full disk or a read-only folder.
         reason = f"{error.strerror}: {error.filename}" if error.filename else error
         print(f"loco-drake: {one_line(str(reason))}", file=sys.stderr)
         return 1
@@ -128,7 +136,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _is_error(record: logging.LogRecord) -> bool:
-    """Drake reports harmless properties of models below this level."""
+    """Returns False for messages about harmless properties of models."""
     return record.levelno >= logging.ERROR
 
 
@@ -149,9 +157,9 @@ def _split(arguments: list[str], members: list[str]) -> tuple[str, list[str]]:
 
 def _print_help(names: list[str]) -> None:
     console = Console()
-    console.print("loco-drake: quadruped motion, learned and simulated in Drake\n")
+    console.print("loco-drake: learn quadruped motion and simulate it in Drake\n")
     table = Table(box=None, show_header=False, padding=(0, 2))
     for name in names:
         table.add_row(f"loco-drake {name}", _COMMANDS[name][2])
     console.print(table)
-    console.print("\nEach command explains its options with --help.")
+    console.print("\nloco-drake COMMAND --help lists the options of a command.")

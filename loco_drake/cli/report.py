@@ -1,4 +1,4 @@
-"""``loco-drake report``: one page of all results, beside what is published."""
+"""``loco-drake report``: writes a page that compares all results with the paper."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,24 +14,25 @@ DEFAULT_REPLAYS = ("dog-trot", "horse-trot", "mpc-bound", "solo8-walk")
 
 @dataclass(kw_only=True)
 class Report:
-    """Make one HTML page of all results: the paper's figures and table, ours beside.
+    """Write one HTML page that compares all results with the paper's figures and table.
 
-    The page needs no other file and no network. Results are what the evaluate commands
-    write with --json; the page says which are missing, and how they are made.
+    The page works offline. Results are the JSON files of the evaluate commands; the
+    page names missing results and the commands that produce them.
     """
 
     results: Path | None = None
-    """Folder of results. Default: those that come with the package."""
+    """Folder of results. Default: the shipped results."""
     out: Path = Path("report.html")
-    """The page."""
+    """HTML file to write."""
     replays: tuple[str, ...] = DEFAULT_REPLAYS
-    """Gaits to simulate and embed, of each robot with a policy; none: no replays."""
+    """Gaits to simulate and embed for each robot that has a policy; none for no
+    replays."""
     replay_seconds: float = 4.0
     """Length of each replay, s."""
     seed: int = 0
-    """Of the motion that is shown."""
+    """Seed of the motion in the replays."""
     json: Path | None = None
-    """Writes paths and counts to this file."""
+    """Write paths and counts to this JSON file."""
 
     def run(self) -> int:
         """Makes the page; returns 0.

@@ -27,53 +27,54 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class Retarget:
-    """Turns recordings into Motion files of a robot, at 50 frames/s.
+    """Retarget recordings to a robot and write Motion files at 50 frames/s.
 
-    With FILE: one stretch of that recording. Without: every stretch in segments.csv of
-    the data folder that holds one of the fifteen gaits, or those asked for by --source
-    and --gait. Each file's provenance says whether its recording is for training or
-    for validation, which --seed decides for the whole data folder, by animal or file.
-    From the stretches, trajectories of 2 s that do not overlap are cut into a folder
-    beside theirs, OUT-trajectories.
+    With FILE, retargets one stretch of that recording. Without, retargets every stretch
+    in segments.csv of the data folder that has one of the fifteen gait labels, or those
+    selected by --source and --gait. The provenance in each file assigns its recording
+    to training or validation; --seed determines this split, by animal or file, for the
+    whole data folder. Trajectories of 2 s that do not overlap are cut from the
+    stretches and written to OUT-trajectories.
     """
 
     file: tyro.conf.Positional[Path | None] = None
     """A recording; needs --source and --gait."""
     source: str | None = None
-    """Where the recordings come from: dog, horse, mpc or solo8. Default: all."""
+    """Source of the recordings: dog, horse, mpc or solo8. Default: all."""
     gait: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """Gait, such as trot; may be given several times. Default: those of the fifteen."""
+    """Gait, such as trot; may be repeated. Default: the gaits of the fifteen labels."""
     robot: str = "go2"
-    """The robot: go2, a1, or a YAML file that says what is in another one's URDF, such
-    as examples/solo8.yaml; docs/retargeting.md explains it."""
+    """Robot: go2, a1, or a YAML file that describes another robot, such as
+    examples/solo8.yaml; see docs/retargeting.md."""
     start: int | None = None
-    """First frame of FILE, from 0, at its own rate. Default: the first of use."""
+    """First frame of FILE, counted from 0 at the file's rate. Default: the first usable
+    one."""
     end: int | None = None
-    """Frame of FILE after the last. Default: the end of the file."""
+    """End frame of FILE, exclusive. Default: the end of the file."""
     fps: float | None = None
-    """Rate of FILE in frames/s. Default: what its format, name or motion tells."""
+    """Rate of FILE in frames/s. Default: inferred from format, name or motion."""
     mirror: bool = False
-    """Exchanges left and right."""
+    """Exchange left and right."""
     froude: bool = False
-    """Scales time for the animal's Froude number, v^2 / (g h): the motion of a robot
-    that is a quarter as high as the animal lasts half as long, and a larger robot's
-    longer. Without it the animal's own timing is kept."""
+    """Scale time to keep the animal's Froude number, v^2 / (g h): a robot a quarter as
+    high as the animal moves in half the time. Default: keep the animal's timing."""
     out: Path | None = None
-    """Folder for the Motion files. Default: motions/ROBOT, with -mirrored and -froude
-    behind it where these are asked for."""
+    """Folder for the Motion files. Default: motions/ROBOT, with the suffixes -mirrored
+    and -froude for these options."""
     trajectories: int = 10
-    """How many 2 s trajectories to cut for each of the fifteen labels, as far as the
-    recordings hold as many; 0: none. With FILE there are none."""
+    """Number of 2 s trajectories for each of the fifteen labels, at most; 0 for none.
+    None are cut with FILE."""
     workers: int = 1
-    """Processes."""
+    """Number of worker processes."""
     data_dir: Path | None = None
-    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache."""
+    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache
+    folder."""
     strict: bool = False
-    """Exits with status 1 if a figure of a clip is outside its bound."""
+    """Exit with status 1 if a figure of a clip is outside its bounds."""
     json: Path | None = None
-    """Writes the figures of each clip to this file."""
+    """Write the figures of each clip to this JSON file."""
     seed: int = 0
-    """Which recordings are for validation, and which trajectories are cut."""
+    """Seed of the split and of the choice of trajectories."""
 
     def run(self) -> int:
         """Writes the files and prints the table; returns the exit status.

@@ -1,4 +1,4 @@
-"""``loco-drake simulate``: a robot does a gait, in physics."""
+"""``loco-drake simulate``: simulates a robot that performs a gait."""
 
 import sys
 import time
@@ -24,47 +24,47 @@ _MAX_DURATION = 3600.0
 
 
 def _default(value: str, metavar: str) -> Any:
-    """Names the default of an option that, not given, may be a scenario's."""
+    """Documents the default of an option that a scenario can also set."""
     hint = f"(default: {value})"
     return tyro.conf.arg(metavar=metavar, help_behavior_hint=hint)
 
 
 @dataclass(kw_only=True)
 class Simulate:
-    """Simulate a robot that does a gait, written by the generator, in Drake."""
+    """Simulate a robot in Drake that tracks generated motion or a Motion file."""
 
     robot: Annotated[str | None, _default("go2", "STR")] = None
     """Robot: go2 or a1."""
     gait: Annotated[str | None, _default("dog-trot", "STR")] = None
-    """Gait label, source-gait, such as dog-trot; or several, the later ones with the
-    time in s at which they begin: dog-pace,dog-trot@3. Ignored with a Motion file."""
+    """Gait label, such as dog-trot, or a schedule of labels with start times in s, such
+    as dog-pace,dog-trot@3. Ignored with a Motion file."""
     duration: Annotated[float | None, _default("10.0", "FLOAT")] = None
-    """Seconds to simulate; of a Motion file at most its length."""
+    """Seconds to simulate; at most the length of a Motion file."""
     seed: Annotated[int | None, _default("0", "INT")] = None
-    """What the motion is drawn with."""
+    """Seed of the generated motion."""
     reference: Annotated[str | None, _default("gpt", "STR")] = None
-    """gpt: written by the generator while the simulation runs; or a Motion file."""
+    """gpt, to generate motion during the simulation, or the path of a Motion file."""
     policy: Annotated[Path | None, _default("the robot's main one", "PATH")] = None
-    """Weights of the policy, or the name of another shipped one, such as randomized."""
+    """Weights of the policy, or the name of a shipped variant, such as randomized."""
     meshcat: bool = True
-    """Show the simulation live in the browser, in real time at best."""
+    """Show the simulation in the browser, at most at real-time speed."""
     port: int | None = None
-    """Port of Meshcat; default, or if it is in use: a free one."""
+    """Meshcat's port. Default: a free one, also if the port is in use."""
     html: Path | None = None
-    """Save the replay as one HTML page."""
+    """Save a replay as one HTML page."""
     contact: Annotated[str | None, _default("similar", "STR")] = None
     """Contact solver: similar, lagged, sap or cenic."""
     time_step: Annotated[float | None, _default("0.01", "FLOAT")] = None
-    """Step of the physics, s."""
+    """Time step of the physics, s."""
     friction: Annotated[float | None, _default("0.8", "FLOAT")] = None
-    """Friction of the ground."""
+    """Coulomb friction coefficient of the ground."""
     scenario: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """A scenario in YAML, see loco_drake.systems.scenario: its fields are the defaults
-    of the options above, which win where they are given."""
+    """Scenario in YAML, see loco_drake.systems.scenario. Its fields replace the
+    defaults of the options above; options that are given take precedence."""
     overlay: Annotated[str | None, tyro.conf.arg(metavar="TEXT")] = None
-    """YAML text that overrides fields of the scenario: "plant: {accuracy: 1.0e-4}"."""
+    """YAML that overrides fields of the scenario, as in "plant: {accuracy: 1.0e-4}"."""
     json: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """Write the figures to a file."""
+    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Simulates, prints and writes; returns the exit status."""

@@ -15,24 +15,24 @@ from loco_drake.motion.gaits import LABELS
 
 @dataclass(kw_only=True)
 class TrainClassifier(LoopSettings):
-    """Trains the transformer that tells which gait a trajectory of 2 s is of.
+    """Train the transformer that classifies the gait of a 2 s trajectory.
 
-    `evaluate generation` trains its own; this one is to be looked at and used. Ctrl-C
-    saves a checkpoint and stops; --resume goes on from it.
+    `evaluate generation` trains its own classifiers and does not need this one. Ctrl-C
+    saves a checkpoint and stops; --resume continues.
     """
 
     NAME: ClassVar[str] = "classifier"
     motions: Path = Path("motions/go2")
-    """Folder of Motion files, such as `retarget` writes; those for validation are held
-    out to test on."""
+    """Folder of Motion files written by `retarget`; motions of the validation set are
+    held out for testing."""
     out: Path = Path("runs/classifier")
-    """Folder for the weights (classifier.safetensors), checkpoint and logs."""
+    """Folder for classifier.safetensors, the checkpoint and logs."""
     steps: int = 300
-    """Optimizer steps in all."""
+    """Total optimizer steps."""
     learning_rate: float = 1e-3
-    """Highest learning rate."""
+    """Peak learning rate."""
     json: Path | None = None
-    """Writes the figures to this file."""
+    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Trains; returns 1 if it was stopped before its last step, else 0.

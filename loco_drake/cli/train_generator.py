@@ -13,31 +13,31 @@ from loco_drake.generation.loop_settings import LoopSettings
 
 @dataclass(kw_only=True)
 class TrainGenerator(LoopSettings):
-    """Trains the GPT that writes tokens for a gait and a duration.
+    """Train the GPT that generates tokens for a gait and a duration.
 
-    Ctrl-C saves a checkpoint and stops; --resume goes on from it.
+    Ctrl-C saves a checkpoint and stops; --resume continues.
     """
 
     NAME: ClassVar[str] = "generator"
     motions: tuple[Path, ...] = (Path("motions/go2"),)
-    """Folders of Motion files, those that the tokenizer was trained on."""
+    """Folders of the Motion files that the tokenizer was trained on."""
     tokenizer: Path = Path("runs/tokenizer/tokenizer.safetensors")
     """Weights from `train tokenizer`."""
     out: Path = Path("runs/generator")
-    """Folder for the weights (generator.safetensors), checkpoint and logs."""
+    """Folder for generator.safetensors, the checkpoint and logs."""
     books: int = 8
-    """Codebooks of the tokenizer that it writes, the coarsest first. Finer ones hold
-    what is too irregular to be predicted."""
+    """Number of codebooks to generate, the coarsest first. Finer codebooks encode
+    detail that is too irregular to predict."""
     steps: int = 6000
-    """Optimizer steps in all."""
+    """Total optimizer steps."""
     stitched: int = 50
-    """Motions of 20 s that are made of the clips to learn from, for each gait."""
+    """Number of 20 s motions per gait to assemble from the training clips."""
     learning_rate: float = 1e-3
-    """Highest learning rate."""
+    """Peak learning rate."""
     weight_decay: float = 0.1
-    """Of AdamW."""
+    """Weight decay of AdamW."""
     json: Path | None = None
-    """Writes the figures to this file."""
+    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Trains; returns 1 if it was stopped before its last step, else 0.

@@ -12,23 +12,23 @@ from loco_drake.generation.loop_settings import LoopSettings
 
 @dataclass(kw_only=True)
 class TrainTokenizer(LoopSettings):
-    """Trains the VQ-VAE that turns motion into tokens and back.
+    """Train the VQ-VAE that encodes motion as tokens and decodes it.
 
-    Ctrl-C saves a checkpoint and stops; --resume goes on from it.
+    Ctrl-C saves a checkpoint and stops; --resume continues.
     """
 
     NAME: ClassVar[str] = "tokenizer"
     motions: tuple[Path, ...] = (Path("motions/go2"),)
-    """Folders of Motion files, such as `retarget` writes, one for each robot; those for
-    validation are held out to test on."""
+    """Folders of Motion files written by `retarget`, one for each robot; motions of the
+    validation set are held out for testing."""
     out: Path = Path("runs/tokenizer")
-    """Folder for the weights (tokenizer.safetensors), checkpoint and logs."""
+    """Folder for tokenizer.safetensors, the checkpoint and logs."""
     steps: int = 9000
-    """Optimizer steps in all."""
+    """Total optimizer steps."""
     learning_rate: float = 2e-3
-    """Highest learning rate."""
+    """Peak learning rate."""
     json: Path | None = None
-    """Writes the figures to this file."""
+    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Trains; returns 1 if it was stopped before its last step, else 0.

@@ -1,4 +1,4 @@
-"""``loco-drake train tracker``: the policy that follows plans."""
+"""``loco-drake train tracker``: trains the tracking policy."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,27 +25,27 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class TrainTracker(TrainingConfig):
-    """Train the tracking policy on a folder of Motion files, by PPO.
+    """Train the tracking policy on a folder of Motion files with PPO.
 
-    Ctrl-C stops it; --resume goes on from the last update.
+    Ctrl-C stops the training; --resume continues from the last update.
     """
 
     NAME: ClassVar[str] = "tracker"
     references: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """Folder of Motion files to follow, such as loco-drake generate writes. Required,
-    but with --resume."""
+    """Folder of Motion files to track, such as `generate` writes. Required without
+    --resume."""
     out: Path = Path("runs/tracker")
-    """Folder of checkpoint, policy and TensorBoard logs."""
+    """Folder for the checkpoint, policy and TensorBoard logs."""
     randomize: bool = False
-    """Draw friction, masses, motors, latency, pushes and noise anew for each episode:
-    every part of --randomization that is not given gets its standard range."""
+    """Randomize friction, masses, motors, latency, pushes and sensor noise in each
+    episode. Parts without a range of their own use the standard range."""
     start_from: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """A checkpoint.safetensors, of any robot, with the networks to begin with."""
+    """A checkpoint.safetensors of any robot whose networks to start from."""
     resume: bool = False
-    """Go on from the checkpoint in --out, with the options of that run; --steps may be
-    more."""
+    """Continue from the checkpoint in --out with the options of that run. Only --steps
+    may increase."""
     json: Path | None = None
-    """Write the figures to a file."""
+    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Trains, prints and writes; returns the exit status."""

@@ -1,4 +1,4 @@
-"""How much ``evaluate generation`` generates and trains."""
+"""Amount of data that ``evaluate generation`` generates and trains on."""
 
 from dataclasses import dataclass
 
@@ -7,16 +7,16 @@ from loco_drake.common.errors import check_at_least
 
 @dataclass(kw_only=True)
 class Effort:
-    """More takes longer and tells more."""
+    """Sample sizes of ``evaluate generation``."""
 
     count: int = 24
-    """Generated trajectories of each label in a set, of 2 s."""
+    """Generated trajectories of 2 s per label and set."""
     generator_seeds: int = 3
-    """Sets of generated trajectories."""
+    """Number of sets of generated trajectories."""
     minutes: int = 16
-    """Motions of 60 s of each label to look for drift in; 0: none."""
+    """Motions of 60 s per label for measuring drift; 0 to skip it."""
     seeds: int = 5
-    """Classifiers that are trained for each figure."""
+    """Classifiers to train for each figure."""
     steps: int = 300
     """Optimizer steps of the transformer."""
 

@@ -1,4 +1,4 @@
-"""How to train a network; apart from the training, which takes seconds to import."""
+"""Settings of network training, separate from the training, which imports slowly."""
 
 import math
 from dataclasses import dataclass
@@ -9,26 +9,26 @@ from loco_drake.common.errors import InputError, check_at_least
 
 @dataclass
 class LoopSettings:
-    """How to run :func:`train`."""
+    """Settings of :func:`loco_drake.generation.training.train`."""
 
     out: Path
     """Folder for the weights, the checkpoint and TensorBoard logs."""
     steps: int
-    """Optimizer steps in all, those before a resume included."""
+    """Total optimizer steps, including those before --resume."""
     learning_rate: float
-    """Highest learning rate: it rises over the first 2 % of the steps, then falls to
-    zero as half a cosine."""
+    """Peak learning rate: warms up over the first 2 % of the steps, then decays to 0 as
+    a half cosine."""
     weight_decay: float = 0.01
-    """Of AdamW."""
+    """Weight decay of AdamW."""
     seed: int = 0
-    """Of the weights and the batches."""
+    """Seed of the initial weights and the batches."""
     resume: bool = False
-    """Go on from the checkpoint in --out, with the options of that run; --steps may be
-    more."""
+    """Continue from the checkpoint in --out with the options of that run. Only --steps
+    may increase."""
     checkpoint_every: int = 500
-    """Steps between checkpoints."""
+    """Optimizer steps between checkpoints."""
     log_every: int = 20
-    """Steps between entries in the logs."""
+    """Optimizer steps between log entries."""
 
     def check(self) -> None:
         """Raises InputError unless every setting can be used."""

@@ -1,4 +1,4 @@
-"""All that a training of the tracker can be told; the command line takes the same."""
+"""Configuration of the training of the tracking policy; also the command's options."""
 
 from dataclasses import dataclass, field, replace
 from typing import Annotated
@@ -18,16 +18,16 @@ Array = NDArray[np.float64]
 
 @dataclass(kw_only=True)
 class TerminationConfig:
-    """How far the robot may be from its plan before an episode ends.
+    """Distance from the plan at which an episode ends.
 
-    Joint errors cannot see a robot that stands still while its plan walks off, so the
-    base's lag ends episodes too (Bogdanovic et al. 2022 and others).
+    The joints alone cannot detect a robot that stands still while its plan moves on, so
+    errors of the base terminate episodes as well (Bogdanovic et al. 2022 and others).
     """
 
     position: float = 0.35
-    """Distance of the base from the plan's, m."""
+    """Distance between the base and the plan's base, m."""
     rotation: float = 0.8
-    """Angle of the base from the plan's, rad."""
+    """Angle between the base and the plan's base, rad."""
 
     def check(self) -> None:
         """Raises InputError unless both are above 0."""
@@ -54,16 +54,16 @@ class TerminationConfig:
 
 @dataclass(kw_only=True)
 class ResetNoise:
-    """How far from the plan's state episodes start, as standard deviations.
+    """Standard deviations of the initial state about the plan's state.
 
-    A robot that is moved off its plan at the start learns to come back to it: without
-    that, a policy once pushed out of the plan's neighbourhood stays beside it.
+    Starting beside the plan teaches the policy to return to it. Without this noise a
+    policy that is pushed off the plan stays beside it.
 
     Attributes:
-        joints: rad.
-        velocities: of joints (rad/s) and base (rad/s and m/s).
-        position: of the base along x and y, m.
-        heading: of the base, rad; its velocity turns with it.
+        joints: joint angles, rad.
+        velocities: velocities of joints (rad/s) and base (rad/s and m/s).
+        position: position of the base along x and y, m.
+        heading: heading of the base, rad; its velocity turns with it.
     """
 
     joints: float = 0.02
@@ -72,7 +72,7 @@ class ResetNoise:
     heading: float = 0.1
 
     def draw(self, state: Array, random: np.random.Generator) -> Array:
-        """Returns a state [q, v], as in Plan, near ``state``."""
+        """Returns a random state [q, v], as in Plan, near ``state``."""
         state = state.copy()
         turn = yaw_quat(self.heading * random.standard_normal(1))[0]
         state[:4] = quat_multiply(turn, state[:4])
@@ -85,28 +85,27 @@ class ResetNoise:
 
 @dataclass(kw_only=True)
 class EnvironmentConfig:
-    """An environment, but for its plans."""
+    """Configuration of an environment, without its plans."""
 
     robot: str = "go2"
     """Robot: go2 or a1."""
     plant: PlantConfig = field(default_factory=PlantConfig)
     """Contact solver, time step and friction."""
     termination: TerminationConfig = field(default_factory=TerminationConfig)
-    """How far from its plan a robot may be before its episode ends."""
+    """Distance from the plan at which an episode ends."""
     episode_steps: int = 200
     """Steps after which an episode is truncated."""
     reset_noise: ResetNoise = field(default_factory=ResetNoise)
-    """How far from the plan's state episodes start, as standard deviations."""
+    """Standard deviations of the initial state about the plan."""
     position_penalty: Annotated[float, tyro.conf.arg(aliases=("--homing",))] = 0.0
-    """What a step loses in training for each metre that the base is beside its plan,
-    1/m: the reward's own term for it is flat beyond half a metre. It is no part of the
-    returns that are reported."""
+    """Training penalty per step and per metre of distance from the plan, 1/m. The
+    reward's own term is flat beyond half a metre. Reported returns do not include
+    it."""
     fall_cost: float = 0.0
-    """What a fall costs in training beyond the steps that it loses, in steps done
-    perfectly: discounting sees some thirty, a judged episode can lose 500. It is no
-    part of the returns either."""
+    """Training cost of a fall in perfect steps, beyond the steps that it loses.
+    Reported returns do not include it."""
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
-    """In what each episode's world differs from the model; a range is two numbers."""
+    """Domain randomization; a range is two numbers."""
 
     def check(self) -> None:
         """Raises InputError unless every part is sound."""
@@ -124,11 +123,10 @@ class EnvironmentConfig:
         self.randomization.check(robot, self.plant)
 
     def known_to(self, *, privileged: bool) -> "EnvironmentConfig":
-        """Returns what to train a policy in that may not know where in the world it is.
+        """Returns the configuration for a policy that may lack privileged observations.
 
-        Such a policy cannot help drifting from the plan, so that episodes do not end
-        before 1 m of it, which a robot that stands still reaches all the same; and it
-        need not learn to come back from beside it.
+        A policy that does not observe its position inevitably drifts from the plan. Its
+        episodes end at a distance of at least 1 m, and start on the plan in x and y.
         """
         if privileged:
             return self
@@ -142,34 +140,34 @@ class EnvironmentConfig:
 
 @dataclass(kw_only=True)
 class PpoConfig:
-    """How to learn."""
+    """Configuration of PPO."""
 
     batch: int = 4096
-    """Environment steps between updates; what is saved lags no more behind."""
+    """Environment steps per update. An interruption loses at most one batch."""
     minibatch: int = 1024
-    """Environment steps in a gradient step, of those of a batch."""
+    """Environment steps per minibatch."""
     epochs: int = 5
-    """Passes over a batch."""
+    """Epochs per batch."""
     gamma: float = 0.97
-    """Discount a step."""
+    """Discount factor per step."""
     gae_lambda: float = 0.95
-    """Of generalized advantage estimation."""
+    """Lambda of generalized advantage estimation."""
     clip: float = 0.2
-    """Range of the probability ratio."""
+    """Clipping range of the probability ratio."""
     actor_rate: float = 5e-4
-    """Learning rate of the actor to start with."""
+    """Initial learning rate of the actor."""
     target_kl: float = 0.02
-    """Divergence that an update should have; the actor's learning rate follows it
-    (Schulman et al. 2017; Rudin et al. 2022)."""
+    """KL divergence per update that the actor's learning rate is adapted to (Schulman
+    et al. 2017; Rudin et al. 2022)."""
     critic_rate: float = 1e-3
-    """Learning rate of the critic, which has nothing to diverge from."""
+    """Learning rate of the critic."""
     log_std: float = -0.7
     """Initial log standard deviation of the actions."""
     hidden: list[int] = field(default_factory=lambda: [256, 128])
-    """Widths of the hidden layers of actor and critic each."""
+    """Widths of the hidden layers, of actor and critic each."""
     privileged: bool = True
-    """Whether the policy sees where in the world the base is and how fast it moves,
-    which a robot outside simulation does not know well; the critic always does."""
+    """Whether the policy observes position and velocity of the base, which a real robot
+    does not know well. The critic always does."""
 
     def check(self, environments: int) -> None:
         """Raises InputError unless it fits so many environments."""
@@ -201,22 +199,22 @@ class PpoConfig:
 
 @dataclass(kw_only=True)
 class TrainingConfig:
-    """How to train a tracker."""
+    """Configuration of a training."""
 
     steps: int = 2_000_000
-    """Environment steps in all, of 20 ms each, those before a resume included."""
+    """Total environment steps of 20 ms each, including those before --resume."""
     workers: int = 2
-    """Processes that simulate."""
+    """Number of simulation processes."""
     per_worker: int = 8
-    """Environments in each process."""
+    """Environments per process."""
     seed: int = 0
-    """Of everything random."""
+    """Seed of all random numbers."""
     environment: Annotated[EnvironmentConfig, tyro.conf.arg(name="")] = field(
         default_factory=EnvironmentConfig
     )
-    """What is simulated."""
+    """The environment."""
     ppo: Annotated[PpoConfig, tyro.conf.arg(name="")] = field(default_factory=PpoConfig)
-    """How is learned."""
+    """The learner."""
 
     def check(self) -> None:
         """Raises InputError unless a training can begin."""

@@ -1,4 +1,4 @@
-"""What differs from episode to episode: the distribution of domains."""
+"""Domain randomization: the distribution from which each episode draws a Domain."""
 
 from dataclasses import dataclass, fields, replace
 from math import inf
@@ -44,33 +44,32 @@ BIAS = error_vector(
 
 @dataclass(kw_only=True)
 class RandomizationConfig:
-    """Ranges that each episode's world is drawn from; a part that is None is off.
+    """Ranges from which each episode's world is drawn; a part that is None is off.
 
-    Draws are uniform within a range, unless said otherwise. docs/tracking.md says how
-    each part is modelled and where the ranges of STANDARD come from.
+    Draws are uniform unless stated otherwise. docs/tracking.md describes the model of
+    each part and the sources of the ranges in STANDARD.
     """
 
     friction: tuple[float, float] | None = None
-    """Coulomb friction of the ground; the feet have .8, and the coefficient of a
-    contact is the harmonic mean of the two."""
+    """Coulomb friction coefficient of the ground. A contact uses the harmonic mean with
+    the feet's .8."""
     stiffness: tuple[float, float] | None = None
-    """Stiffness of the ground, N/m, log-uniform; in series with the feet's 5e4."""
+    """Stiffness of the ground in N/m, log-uniform; in series with the feet's 5e4."""
     payload: tuple[float, float] | None = None
-    """Mass added to the trunk, kg; negative ones make it lighter."""
+    """Mass added to the trunk in kg; may be negative."""
     com_shift: tuple[float, float] | None = None
     """Shift of the trunk's centre of mass along each of its axes, m."""
     motor_strength: tuple[float, float] | None = None
     """Torque of each motor over that of its model."""
     latency: tuple[float, float] | None = None
-    """Delay of the set-points, s, rounded to whole steps of the physics."""
+    """Delay of the set-points in s, rounded to whole time steps."""
     push: tuple[float, float] | None = None
-    """Size of pushes: the horizontal velocity, m/s, that the robot would gain as a
-    whole, in any direction; its mass times that is the impulse, spread over .1 s."""
+    """Change of the robot's velocity by a push in a random horizontal direction, m/s.
+    The force lasts .1 s."""
     push_interval: tuple[float, float] = (1.0, 3.0)
-    """Time from the start, or from one push, to the next, s."""
+    """Time from the start to the first push and between pushes, s."""
     noise: float | None = None
-    """Errors of the sensors, as a multiple of WHITE and BIAS, the standard deviations
-    in loco_drake.tracking.randomization."""
+    """Sensor errors, as a multiple of the standard deviations in docs/tracking.md."""
 
     def check(
         self, robot: "Robot | None" = None, plant: "PlantConfig | None" = None
