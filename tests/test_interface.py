@@ -44,3 +44,14 @@ def test_another_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'Simulate'"):
         loco_drake.Simulate  # noqa: B018
     assert not hasattr(loco_drake, "__wrapped__")
+
+
+def test_files_of_motion_are_read_and_written_by_the_room():
+    """``from loco_drake.motion import ...`` gives the functions of its modules."""
+    from loco_drake import motion
+    from loco_drake.motion import motion_file
+
+    assert motion.load_motion is motion_file.load_motion
+    assert motion.save_motion is motion_file.save_motion
+    with pytest.raises(AttributeError, match="no attribute 'load'"):
+        _ = motion.load
