@@ -1,4 +1,4 @@
-"""The systems between a plan and a plant; each applies a function of control/."""
+"""Systems between a plan and a plant. Each applies a function of control/."""
 
 from typing import Any
 
@@ -17,15 +17,17 @@ from loco_drake.models.robots import Robot
 
 
 class RobotState(LeafSystem):
-    """Outputs the robot's state with the base's quaternion at length one.
+    """Outputs the robot's state with a unit quaternion, see :func:`unit_base`.
 
     .. pydrake_system::
 
         name: RobotState
         input_ports:
-        - plant_state: [q, v] of the robot's model instance, size 13 + 2 J; m, rad, s
+        - plant_state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s
         output_ports:
-        - state: the same after :func:`unit_base`; what looks at the robot takes this
+        - state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s
+
+    All observers of the robot read this port rather than the plant's.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -42,7 +44,7 @@ class RobotState(LeafSystem):
 
 
 class _PlanFollower(LeafSystem):
-    """A system with an input port ``plan``."""
+    """Base of systems with an input port ``plan``."""
 
     def __init__(self, robot: Robot) -> None:
         super().__init__()
@@ -52,22 +54,22 @@ class _PlanFollower(LeafSystem):
         self._plan_now = {self.time_ticket(), self._plan.ticket()}
 
     def _now(self, context: Context) -> tuple[Plan, int]:
-        """Returns the plan, and which of its samples is the present one."""
+        """Returns the plan and the index of its current sample."""
         plan = self._plan.Eval(context)
         return plan, plan.index(context.get_time())
 
 
 class PlanState(_PlanFollower):
-    """Outputs the state that the plan wants now, and the plan time that has passed.
+    """Outputs the plan's current state and path time.
 
     .. pydrake_system::
 
         name: PlanState
         input_ports:
-        - plan: a Plan
+        - plan: abstract, Plan
         output_ports:
-        - state: [q, v] in the plant's order, size 13 + 2 J; m, rad, s
-        - path_time: seconds of motion as it was written, size 1
+        - state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s
+        - path_time: vector (1,), time before smoothing; s
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -90,17 +92,17 @@ class PlanState(_PlanFollower):
 
 
 class Observation(_PlanFollower):
-    """Computes :func:`observe` from its inputs.
+    """Outputs the observation of the policy, see :func:`observe`.
 
     .. pydrake_system::
 
         name: Observation
         input_ports:
-        - plan: a Plan
-        - state: [q, v] of the robot, as it is measured, size 13 + 2 J; m, rad, s
-        - action: the policy's, as it is being applied, size J
+        - plan: abstract, Plan
+        - state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s; as measured
+        - action: vector (J,), the action in use; ACTION_SCALE
         output_ports:
-        - observation: see OBSERVATION_LAYOUT, size OBSERVATION_SIZE
+        - observation: vector (OBSERVATION_SIZE,); see OBSERVATION_LAYOUT
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -125,17 +127,17 @@ class Observation(_PlanFollower):
 
 
 class TrackingPolicy(LeafSystem):
-    """Outputs the network's mean action for the observation at its input.
+    """Outputs the mean action of the network for an observation.
 
     .. pydrake_system::
 
         name: TrackingPolicy
         input_ports:
-        - observation: see OBSERVATION_LAYOUT, size OBSERVATION_SIZE
+        - observation: vector (OBSERVATION_SIZE,); see OBSERVATION_LAYOUT
         output_ports:
-        - action: in units of ACTION_SCALE, size 12
+        - action: vector (12,); ACTION_SCALE
 
-    It has no state and no clock: :class:`JointTargets` decides when to sample it.
+    The system has no state and no clock; :class:`JointTargets` samples it.
     """
 
     def __init__(self, actor: Actor) -> None:
@@ -151,28 +153,28 @@ class TrackingPolicy(LeafSystem):
 
     def _calc(self, context: Context, output: Any) -> None:
         observation = torch.from_numpy(self._observation.Eval(context)).float()
-        # In a user's process, too: torch's second thread would wait for a busy core.
+        # For user processes: a second torch thread would wait for a busy core.
         with torch.inference_mode(), single_thread():
             output.set_value(self._actor(observation).double().numpy())
 
 
 class JointTargets(_PlanFollower):
-    """Holds, for one control period, the reference plus the policy's correction.
+    """Computes the PD set-points at 50 Hz and holds them in between.
 
     .. pydrake_system::
 
         name: JointTargets
         input_ports:
-        - plan: a Plan
-        - action: the policy's, in units of ACTION_SCALE, size J
+        - plan: abstract, Plan
+        - action: vector (J,); ACTION_SCALE
         output_ports:
-        - desired_state: what the PD is sent, [q_d, 0], rad and rad/s, size 2 J
-        - action: the one that is being held, size J
+        - desired_state: vector (2 J,), [q_d, 0]; rad, rad/s
+        - action: vector (J,), the action in use; ACTION_SCALE
 
-    Every PLAN_DT it samples its inputs and sets :func:`joint_targets` of the action and
-    of the plan's :func:`set_points` at t + PLAN_DT. The sampling is an unrestricted
-    update, which Drake performs before the plant's discrete update at the same time:
-    the action reaches the joints without delay.
+    Every PLAN_DT the system samples its inputs and computes :func:`joint_targets` from
+    the action and from the plan's :func:`set_points` at t + PLAN_DT. Drake performs
+    this unrestricted update before the plant's discrete update at the same time, so an
+    action takes effect without delay.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -183,7 +185,7 @@ class JointTargets(_PlanFollower):
             joint_targets(robot.stand_joints, still)
         )
         self._held = self.DeclareDiscreteState(still)
-        # Ports of states need no Python while the plant steps.
+        # State output ports call no Python while the plant steps.
         self.DeclareStateOutputPort("desired_state", self._targets)
         self.DeclareStateOutputPort("action", self._held)
         self.DeclarePeriodicUnrestrictedUpdateEvent(
@@ -201,16 +203,16 @@ class JointTargets(_PlanFollower):
 
 
 class TrackingReward(_PlanFollower):
-    """Computes :func:`reward_terms` from its inputs.
+    """Outputs the terms of the reward, see :func:`reward_terms`.
 
     .. pydrake_system::
 
         name: TrackingReward
         input_ports:
-        - plan: a Plan
-        - state: [q, v] of the robot, size 13 + 2 J; m, rad, s
+        - plan: abstract, Plan
+        - state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s
         output_ports:
-        - reward_terms: weighted, see REWARD_TERMS, size 5
+        - reward_terms: vector (5,), weighted; see REWARD_TERMS
     """
 
     def __init__(self, robot: Robot) -> None:

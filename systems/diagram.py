@@ -1,4 +1,4 @@
-"""The diagram of a robot that does what a plan says."""
+"""The diagram of a robot that tracks a plan."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -48,15 +48,15 @@ from .toppra_smoother import ToppraSmoother
 
 @dataclass(frozen=True)
 class Locomotion:
-    """What :func:`AddLocomotion` added, to connect to.
+    """The systems that :func:`AddLocomotion` added, with ports to connect.
 
     Attributes:
         robot: the robot.
-        plant: finalized, with the robot in it.
-        scene_graph: the plant's.
-        instance: the robot's in the plant.
-        inputs: ports by name, those of :func:`MakeLocomotionDiagram`.
-        outputs: the same.
+        plant: the finalized plant that contains the robot.
+        scene_graph: the plant's scene graph.
+        instance: the robot's model instance in the plant.
+        inputs: input ports by name, see :func:`MakeLocomotionDiagram`.
+        outputs: output ports by name, see :func:`MakeLocomotionDiagram`.
     """
 
     robot: Robot
@@ -67,7 +67,7 @@ class Locomotion:
     outputs: dict[str, OutputPort] = field(default_factory=dict)
 
     def ExportPorts(self, builder: DiagramBuilder) -> None:
-        """Exports all of its ports by their names."""
+        """Exports all ports by their names."""
         for name, port in self.inputs.items():
             builder.ExportInput(port, name)
         for name, port in self.outputs.items():
@@ -83,39 +83,41 @@ def MakeLocomotionDiagram(
 
         name: LocomotionDiagram
         input_ports:
-        - gait: optional, of a generated reference: index into LABELS, size 1
-        - action: of ExternalAction only; in units of ACTION_SCALE, size J
-        - desired_state: of ExternalTargets only, which has but the last two outputs;
-          what the PD is sent, [q_d, 0], rad and rad/s, size 2 J
+        - gait: vector (1,), index into LABELS; only of a generated reference, optional
+        - action: vector (J,); ACTION_SCALE; only with ExternalAction
+        - desired_state: vector (2 J,), [q_d, 0]; rad, rad/s; only with ExternalTargets
         output_ports:
-        - plan: the Plan that is followed
-        - plan_state: [q, v] that it wants now, size 13 + 2 J; m, rad, s
-        - path_time: seconds of motion as it was written, size 1
-        - observation: what the policy sees, see OBSERVATION_LAYOUT
-        - action: the one that is being held, size J
-        - desired_state: what the PD is sent, as above
-        - reward_terms: weighted, see REWARD_TERMS, size 5
-        - state: [q, v] of the robot, its quaternion of length one, size 13 + 2 J
-        - net_actuation: torques of the joints, Nm, size J
+        - plan: abstract, Plan; the plan that is tracked
+        - plan_state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s
+        - path_time: vector (1,), time before smoothing; s
+        - observation: vector (OBSERVATION_SIZE,); see OBSERVATION_LAYOUT
+        - action: vector (J,), the action in use; ACTION_SCALE
+        - desired_state: vector (2 J,), [q_d, 0]; rad, rad/s
+        - reward_terms: vector (5,), weighted; see REWARD_TERMS
+        - state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s
+        - net_actuation: vector (J,), joint torques; N m
+
+    With ExternalTargets the only output ports are state and net_actuation. The
+    quaternions in plan_state and state have length one.
 
     The subsystems are named plant, scene_graph, robot_state, reference, smoother,
-    observation, policy, joint_targets, plan_state and reward, and actuation, pushes and
-    sensors of the scenario's disturbances; what is not asked for is not there.
-    Simulate it like this, since a robot must start where its plan starts::
+    observation, policy, joint_targets, plan_state and reward; the scenario's
+    disturbances add actuation, pushes and sensors. A robot must start on its plan, so
+    simulate it like this::
 
         simulator = MakeSimulator(diagram, scenario)
         StartEpisode(simulator)
         simulator.AdvanceTo(10.0)
 
-    Drake never frees a diagram that holds systems written in Python: make one and start
-    episodes in it.
+    Drake never frees a diagram that contains systems written in Python. Reuse one
+    diagram for all episodes.
 
     Args:
-        scenario: what to simulate.
-        meshcat: where to draw the robot and the plan's keypoints, if anywhere.
+        scenario: the scenario.
+        meshcat: where to draw the robot and the plan's keypoints.
 
     Raises:
-        InputError: if the scenario is not sound, or names what does not exist.
+        InputError: if the scenario is invalid.
     """
     builder = DiagramBuilder()
     AddLocomotion(builder, scenario, meshcat=meshcat).ExportPorts(builder)
@@ -131,19 +133,19 @@ def AddLocomotion(
     meshcat: Meshcat | None = None,
     pre_finalize: Callable[[MultibodyPlant, SceneGraph], None] | None = None,
 ) -> Locomotion:
-    """Adds to ``builder`` what ``scenario`` describes; nothing is exported.
+    """Adds the systems that ``scenario`` describes to ``builder``; exports no ports.
 
     Args:
-        builder: of a diagram that has no plant yet.
-        scenario: what to simulate.
-        meshcat: where to draw the robot and the plan's keypoints, if anywhere.
-        pre_finalize: adds bodies of your own to the robot's plant.
+        builder: the builder of a diagram that has no plant yet.
+        scenario: the scenario.
+        meshcat: where to draw the robot and the plan's keypoints.
+        pre_finalize: called with plant and scene graph; may add bodies to the plant.
 
     Returns:
         The plant, and the ports of :func:`MakeLocomotionDiagram` by name.
 
     Raises:
-        InputError: if the scenario is not sound, or names what does not exist.
+        InputError: if the scenario is invalid, or the builder has a plant.
     """
     scenario.check()
     if builder.HasSubsystemNamed("plant"):
@@ -174,7 +176,7 @@ def AddLocomotion(
         ApplyVisualizationConfig(
             scenario.visualization,
             builder,
-            # Without a bus of that name it would publish to LCM as well.
+            # A null bus disables publishing to LCM.
             lcm_buses=ApplyLcmBusConfig({"default": None}, builder),
             meshcat=meshcat,
         )
@@ -187,7 +189,7 @@ def AddLocomotion(
 def _Add(
     builder: DiagramBuilder, name: str, system: LeafSystem, **inputs: OutputPort
 ) -> LeafSystem:
-    """Adds a system and connects its input ports, by name."""
+    """Adds a system and connects its input ports by name."""
     builder.AddNamedSystem(name, system)
     for port, source in inputs.items():
         builder.Connect(source, system.GetInputPort(port))
@@ -197,10 +199,10 @@ def _Add(
 def _AddDisturbances(
     builder: DiagramBuilder, made: Locomotion, scenario: Scenario, state: OutputPort
 ) -> tuple[OutputPort, InputPort]:
-    """Adds what makes the world unlike the model.
+    """Adds the systems that simulate a world unlike the model.
 
     Returns:
-        The state as it is measured, and the port that takes the PD's set-points.
+        The port of the measured state and the port for the PD set-points.
     """
     robot, plant, wanted = made.robot, made.plant, scenario.disturbances
     desired_state = plant.get_desired_state_input_port(made.instance)
@@ -225,7 +227,7 @@ def _AddDisturbances(
 
 
 def _AddPlan(builder: DiagramBuilder, made: Locomotion, scenario: Scenario) -> None:
-    """Adds what makes the plan."""
+    """Adds the reference and the smoother."""
     reference = _MakeReference(made.robot, scenario)
     _Add(builder, "reference", reference)
     made.outputs["plan"] = reference.GetOutputPort("plan")
@@ -244,7 +246,7 @@ def _AddPlan(builder: DiagramBuilder, made: Locomotion, scenario: Scenario) -> N
 def _MakeReference(robot: Robot, scenario: Scenario) -> LeafSystem:
     reference = scenario.reference
     if isinstance(reference, GeneratedReference):
-        # Loads torch models, which players do without.
+        # Imports torch models, which a player does not need.
         from .reference_generator import ReferenceGenerator
 
         return ReferenceGenerator(robot, reference)
@@ -260,7 +262,7 @@ def _AddControl(
     state: OutputPort,
     desired_state: InputPort,
 ) -> None:
-    """Adds what turns plan and state into the PD's set-points."""
+    """Adds the systems that compute the PD set-points from plan and state."""
     robot, plan = made.robot, made.outputs["plan"]
     targets = _Add(builder, "joint_targets", JointTargets(robot), plan=plan)
     builder.Connect(targets.GetOutputPort("desired_state"), desired_state)
@@ -276,12 +278,12 @@ def _AddControl(
         builder.Connect(policy.GetOutputPort("action"), targets.GetInputPort("action"))
     made.outputs["observation"] = seen
     made.outputs["action"] = action
-    # What reaches the PD, which is the actuation's if there is one.
+    # Actuation, if present, has already set the port that reaches the PD.
     made.outputs.setdefault("desired_state", targets.GetOutputPort("desired_state"))
 
 
 def _AddScores(builder: DiagramBuilder, made: Locomotion, state: OutputPort) -> None:
-    """Adds what says how well the plan is followed."""
+    """Adds the systems that measure tracking."""
     plan = made.outputs["plan"]
     reward = TrackingReward(made.robot)
     _Add(builder, "reward", reward, plan=plan, state=state)

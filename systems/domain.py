@@ -1,9 +1,9 @@
-"""In what an episode's world differs from the model: a domain, and how it is set.
+"""Systems and functions that simulate a world unlike the model.
 
-Domain randomization (Tobin et al. 2017; Tan et al. 2018, "Sim-to-real") draws a domain
-for each episode. All of it lives in the Context: parameters of plant and scene graph,
-and the parameter of three systems that a diagram holds only if its scenario asks for
-them, :class:`Actuation`, :class:`Pushes` and :class:`Sensors`.
+Domain randomization (Tobin et al. 2017; Tan et al. 2018, "Sim-to-real") draws a Domain
+for each episode. A Domain is stored in the Context: in parameters of plant and scene
+graph, and in a parameter of the systems :class:`Actuation`, :class:`Pushes` and
+:class:`Sensors`, which the diagram contains only if its scenario asks for them.
 """
 
 from typing import Any
@@ -45,7 +45,7 @@ _TOLERANCE = 1e-6  # s, or of a sample; context times are sums of steps
 
 
 class DomainSystem(LeafSystem):
-    """A system with a domain as its parameter; by default, one like the model."""
+    """Base of systems that have a Domain as their parameter."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -55,7 +55,7 @@ class DomainSystem(LeafSystem):
         self._domain_ticket = self.abstract_parameter_ticket(self._index)
 
     def SetDomain(self, context: Context, domain: Domain) -> None:
-        """Sets the domain; ``context`` is this system's own."""
+        """Sets the domain in ``context``, which is this system's own."""
         context.get_mutable_abstract_parameter(self._index).set_value(domain)
 
     def _domain(self, context: Context) -> Domain:
@@ -63,37 +63,37 @@ class DomainSystem(LeafSystem):
 
 
 class Actuation(DomainSystem):
-    """Turns wanted set-points into those that make the plant's PD act as its motors do.
+    """Simulates latency and strength of the motors by changing the PD set-points.
 
     .. pydrake_system::
 
         name: Actuation
         input_ports:
-        - desired_state: for the PD as modelled, [q_d, 0], rad and rad/s, size 2 J
-        - state: [q, v] of the robot, size 13 + 2 J; m, rad, s
+        - desired_state: vector (2 J,), [q_d, 0] of the nominal motors; rad, rad/s
+        - state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s
         output_ports:
-        - desired_state: for the plant's PD, the same
+        - desired_state: vector (2 J,), [q_d', 0] for the plant; rad, rad/s
 
-    *Latency.* Set-points come out n = latency / time_step steps of the physics after
-    they came in: a step that begins at t uses those of t - n time_step, and until there
-    are such, the first ones.
+    *Latency.* Set-points are delayed by n = latency / time_step steps of the plant: the
+    step that begins at t uses those of t - n time_step, or the first ones at the start.
 
-    *Strength.* Gains and effort limits of Drake's PD are not in the Context. But its
-    torque kp (q_d - q) - kd v is linear in the set-point. With q and v at the beginning
-    of a step and h its length,
+    *Strength.* Drake stores PD gains and effort limits outside the Context, but the
+    torque kp (q_d - q) - kd v is linear in the set-point. For strength s, with q and v
+    at the beginning of a step of length h, the set-point
 
         q_d' = s q_d + (1 - s) (q + (h + kd / kp) v)
 
-    makes the PD, which is implicit and acts on the velocity v' at the end of the step
-    and on q + h v', give
+    makes the implicit PD, which acts on the velocity v' at the end of the step and on
+    q + h v', apply the torque
 
-        s (kp (q_d - q - h v') - kd v') - (1 - s) (kd + kp h) (v' - v):
+        s (kp (q_d - q - h v') - kd v') - (1 - s) (kd + kp h) (v' - v).
 
-    s times its torque, and a term like the inertia (1 - s) (kd + kp h) h. SetDomain
-    takes that off the rotors' inertia, so that the joints move as with gains of s kp
-    and s kd; the output port net_actuation of the plant still has both terms. Under
-    "cenic" h is 0 here, and the rotors stay as they are. Effort limits stay: a weak
-    motor has less torque for the same command, and the same maximum.
+    The first term is s times the nominal torque. The second acts like an inertia
+    (1 - s) (kd + kp h) h, which SetDomain subtracts from the rotor inertia. The joints
+    then move as with the gains s kp and s kd. The plant's port net_actuation contains
+    both terms. Under "cenic" h is 0, and the rotor inertia does not change. The effort
+    limits do not change either: a weak motor has less torque at the same command, but
+    the same maximum.
 
     Args:
         robot: the robot.
@@ -112,7 +112,7 @@ class Actuation(DomainSystem):
         self._surplus = surplus_inertia(robot, plant)
         self._desired = self.DeclareVectorInputPort("desired_state", 2 * size)
         self._state = self.DeclareVectorInputPort("state", 13 + 2 * size)
-        # The set-points of the latest steps, the last one first; NaN before the first.
+        # Set-points of recent steps, newest first; NaN before the first.
         rows = round(MAX_LATENCY / plant.time_step) + 1
         self._past = self.DeclareDiscreteState(np.full(rows * size, np.nan))
         self.DeclarePeriodicDiscreteUpdateEvent(
@@ -131,7 +131,7 @@ class Actuation(DomainSystem):
         )
 
     def reflected_inertia(self, strength: Array) -> Array:
-        """Returns the rotors' inertia at joints for this strength, kg m^2, (12,).
+        """Returns the rotor inertia at the joints for this strength, kg m^2, (12,).
 
         Raises:
             InputError: if a motor is weaker than
@@ -167,24 +167,24 @@ class Actuation(DomainSystem):
         if steps == 0:
             return now
         past = context.get_discrete_state(int(self._past)).value()
-        # A discrete plant steps together with _remember, from what was there before; a
-        # continuous one after it.
+        # A discrete plant steps together with _remember and sees the state before it; a
+        # continuous plant steps after it.
         first = (steps if self._continuous else steps - 1) * self._size
         value = past[first : first + self._size]
         return now if np.isnan(value[0]) else value
 
 
 class Pushes(DomainSystem):
-    """Outputs the forces of its domain's pushes.
+    """Outputs the external forces of the domain's pushes.
 
     .. pydrake_system::
 
         name: Pushes
         output_ports:
-        - spatial_forces: list of ExternallyAppliedSpatialForce, N, expressed in W
+        - spatial_forces: abstract, list[ExternallyAppliedSpatialForce], in W; N, N m
 
-    A discrete plant samples them at the beginning of its steps: a push that begins and
-    lasts whole steps gives the trunk exactly the impulse force times duration.
+    A discrete plant samples the forces at the beginning of its steps. A push that
+    starts at a step and lasts whole steps has exactly the impulse force times duration.
 
     Args:
         trunk: the body to push.
@@ -214,15 +214,15 @@ class Pushes(DomainSystem):
 
 
 class Sensors(DomainSystem):
-    """Outputs the state with the errors of its domain, new ones every PLAN_DT.
+    """Outputs the measured state, with new sensor noise every PLAN_DT.
 
     .. pydrake_system::
 
         name: Sensors
         input_ports:
-        - state: [q, v] of the robot, size 13 + 2 J; m, rad, s
+        - state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s
         output_ports:
-        - state: the same as it is measured
+        - state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s; as measured
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -250,14 +250,14 @@ class Sensors(DomainSystem):
 
 
 def SetDomain(diagram: Diagram, context: Context, domain: Domain) -> None:
-    """Puts a locomotion diagram's Context into ``domain``.
+    """Sets a domain in the Context of a locomotion diagram.
 
-    Ground, trunk and rotors, where the domain does not give them, stay as they are in
+    Ground, trunk and rotors that the domain does not specify keep their values in
     ``context``.
 
     Args:
-        diagram: holds the systems of :func:`.diagram.AddLocomotion`, among them the
-            disturbances that the domain has.
+        diagram: contains the systems of :func:`.diagram.AddLocomotion`, including the
+            disturbances that the domain needs.
         context: the diagram's.
         domain: the domain.
 

@@ -1,4 +1,4 @@
-"""The plan drawn as spheres beside the robot that is to follow it."""
+"""The system that draws a plan as spheres in Meshcat."""
 
 import numpy as np
 from pydrake.common.value import Value
@@ -20,22 +20,22 @@ COLORS = (_FRONT, _FRONT, _REAR, _REAR, _TRUNK, _TRUNK)
 
 
 class KeypointVisualizer(LeafSystem):
-    """Publishes the plan's toes, withers and hip to Meshcat.
+    """Draws the plan's toes, withers and hip in Meshcat.
 
     .. pydrake_system::
 
         name: KeypointVisualizer
         input_ports:
-        - plan: a Plan
+        - plan: abstract, Plan
 
-    Front toes are blue, rear toes red, withers and hip green. Withers and hip are drawn
-    above the robot's front and rear hip joints.
+    Front toes are blue, rear toes red. Withers and hip are green, and lie above the
+    robot's front and rear hip joints.
 
     Args:
-        robot: the robot whose plan it is.
-        meshcat: where to draw.
-        path: the Meshcat path below which the spheres are.
-        period: seconds between frames; a sum of powers of two keeps times exact.
+        robot: the robot.
+        meshcat: the Meshcat to draw in.
+        path: the Meshcat path of the spheres.
+        period: time between frames in s; a sum of powers of two keeps times exact.
     """
 
     def __init__(

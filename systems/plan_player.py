@@ -1,4 +1,4 @@
-"""The system that plays a plan made beforehand."""
+"""The system that outputs a plan made beforehand."""
 
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import AbstractParameterIndex, Context, LeafSystem
@@ -14,14 +14,14 @@ class PlanPlayer(LeafSystem):
 
         name: PlanPlayer
         output_ports:
-        - plan: a Plan
+        - plan: abstract, Plan
 
-    The plan is an abstract parameter: fixed while the clock runs, chosen anew for each
+    The plan is an abstract parameter: constant during a simulation, and set for each
     episode with :meth:`SetPlan`.
 
     Args:
-        robot: the robot that the plans are for.
-        plan: what contexts hold at first; by default, to stand still.
+        robot: the robot.
+        plan: the plan in a default Context; by default the robot stands.
     """
 
     def __init__(self, robot: Robot, plan: Plan | None = None) -> None:
@@ -38,7 +38,7 @@ class PlanPlayer(LeafSystem):
         )
 
     def SetPlan(self, context: Context, plan: Plan) -> None:
-        """Sets the plan to play; ``context`` is this system's own."""
+        """Sets the plan to play in ``context``, which is this system's own."""
         context.get_mutable_abstract_parameter(self._plan).set_value(plan)
 
     def _calc_plan(self, context: Context, output: AbstractValue) -> None:

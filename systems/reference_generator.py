@@ -1,4 +1,4 @@
-"""The system that writes motion for a gait, as long as the simulation runs."""
+"""The system that generates motion of a gait while the simulation runs."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -32,7 +32,7 @@ _KEEP = 1.0  # seconds of plan kept behind what has been used up
 
 @dataclass(frozen=True, eq=False)
 class _Script:
-    """Immutable state: what has been written, and how to go on."""
+    """The immutable state: the plan so far and how to continue it."""
 
     schedule: GaitSchedule
     stream: Stream
@@ -43,34 +43,33 @@ class _Script:
 
 
 class ReferenceGenerator(LeafSystem):
-    """Writes a plan for a gait with the GPT, chunk by chunk, ahead of its use.
+    """Generates a plan for a gait with the GPT, chunk by chunk, ahead of its use.
 
     .. pydrake_system::
 
         name: ReferenceGenerator
         input_ports:
-        - gait: index into LABELS, size 1
-        - path_time: seconds of the plan that have been used up, size 1
+        - gait: vector (1,), index into LABELS; optional
+        - path_time: vector (1,), how much of the plan has been used; s; optional
         output_ports:
-        - plan: a Plan, open-ended
+        - plan: abstract, Plan; open-ended
 
-    ``path_time`` is what the smoother has committed; if it is not connected, the
-    context's time. The configured gait may be a
-    schedule, whose times are on the plan's clock and are kept to a token. ``gait`` is
-    an index into :data:`loco_drake.motion.gaits.LABELS` that overrides it for the
-    chunks still to be written, so that a change comes ``horizon`` and up to a chunk
-    later. What is written depends only on seed, number of the chunk and labels, so that
-    a Context that is cloned or reset repeats it exactly.
+    ``path_time`` comes from the smoother; without it the Context's time is used. The
+    configured gait may be a schedule, whose times are on the plan's clock and are kept
+    to one token. The port ``gait`` overrides the schedule for chunks not yet generated,
+    so a change takes effect after ``horizon`` and up to one chunk. The output depends
+    only on the seed, the chunk's number and the labels: a cloned or reset Context
+    repeats it exactly.
 
     Args:
-        robot: the robot that is to move.
+        robot: the robot.
         config: gait, seed and sampling.
-        model: the motion model; the shipped one if not given.
-        horizon: seconds of plan to have written beyond what is used up.
+        model: the motion model; the shipped one by default.
+        horizon: how far to generate ahead of what has been used, s.
 
     Raises:
-        InputError: if the gait is unknown to the model or no gait at all, or a number
-            in ``config`` is not sensible.
+        InputError: if the model does not know the gait, or a number in ``config`` is
+            out of its bounds.
     """
 
     def __init__(
@@ -103,15 +102,15 @@ class ReferenceGenerator(LeafSystem):
     def SetReference(
         self, context: Context, *, gait: str | None = None, seed: int | None = None
     ) -> None:
-        """Begins anew, from plan time 0; see :func:`.simulator.StartEpisode`.
+        """Restarts from plan time 0; see :func:`.simulator.StartEpisode`.
 
         Args:
             context: this system's own.
-            gait: a gait label, or a schedule of several; by default the configured one.
-            seed: what the tokens are drawn with; by default the configured one.
+            gait: a gait label or a schedule; the configured one by default.
+            seed: seed of the tokens; the configured one by default.
 
         Raises:
-            InputError: if they cannot be.
+            InputError: if a value is out of its bounds.
         """
         config = replace(
             self._config,
@@ -123,7 +122,7 @@ class ReferenceGenerator(LeafSystem):
         context.get_mutable_abstract_state(int(self._script)).set_value(script)
 
     def _begun(self, gait: str, seed: int) -> _Script:
-        """Returns the script as it is at time 0, the first chunks written."""
+        """Returns the script at time 0 with its first chunks generated."""
         stream = self._model.start(
             np.array([seed]), duration=float(self._config.duration)
         )
@@ -154,7 +153,7 @@ class ReferenceGenerator(LeafSystem):
         return EventStatus.Succeeded()
 
     def _label(self, index: float) -> GaitLabel:
-        """Returns the gait that the input port asks for."""
+        """Returns the gait that the input port selects."""
         known = self._model.generator.config.labels
         if index not in [k for k, label in enumerate(LABELS) if str(label) in known]:
             choices = ", ".join(

@@ -1,4 +1,4 @@
-"""What to simulate, as typed data that can be written in YAML."""
+"""The scenario: a typed description of a simulation, which YAML can express."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,32 +18,32 @@ from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS
 from loco_drake.motion.gait_schedule import parse_schedule
 
-# Of a scenario's text: the loader calls itself for each bracket, and copies at each
+# Limits of a scenario's text: the loader recurses at each bracket and copies at each
 # alias.
 _MAX_SIZE = 100_000
 _MAX_BRACKETS = 200
 
-# Mutable dataclasses and no tuples: yaml_load_typed sets fields one by one.
+# Dataclasses are mutable and have no tuples, as yaml_load_typed requires.
 
 
 @dataclass(kw_only=True)
 class GeneratedReference:
-    """Motion written by the generator while the simulation runs."""
+    """Motion generated while the simulation runs."""
 
-    # A gait label, source-gait; or several, the later ones with the s at which they
-    # begin, such as dog-pace,dog-trot@3.
+    # Gait label, such as dog-trot, or a schedule of labels with start times in s, such
+    # as dog-pace,dog-trot@3.
     gait: str = "dog-trot"
-    # What the tokens are drawn with.
+    # Seed of the tokens.
     seed: int = 0
-    # Duration in s that the generator is told; the motion goes on beyond it.
+    # Intended duration in s, which conditions the generator; the motion has no end.
     duration: float = 10.0
-    # Of the distribution that tokens are drawn from; 0 takes the likeliest.
+    # Sampling temperature; 0 is greedy.
     temperature: float = 1.0
-    # Tokens are drawn from the likeliest that make up this much probability.
+    # Sample from the likeliest codes that together have this probability.
     top_p: float = 0.95
 
     def check(self) -> None:
-        """Raises InputError unless every field is sound."""
+        """Raises InputError unless every field is valid."""
         parse_schedule(str(self.gait))
         whole = isinstance(self.seed, int | np.integer)
         if not (whole and 0 <= self.seed < 2**63):
@@ -55,28 +55,28 @@ class GeneratedReference:
 
 @dataclass(kw_only=True)
 class MotionReference:
-    """A Motion file."""
+    """Motion from a Motion file."""
 
     path: Path = Path()
 
 
 @dataclass(kw_only=True)
 class PlanReference:
-    """A plan set from code with PlanPlayer.SetPlan; at first, to stand still."""
+    """A plan set with StartEpisode or PlanPlayer.SetPlan; standing by default."""
 
 
 @dataclass(kw_only=True)
 class SmootherConfig:
-    """How far and how often plans are re-timed."""
+    """Chunk and look-ahead of the smoother."""
 
-    # Seconds of plan that are committed at a time; as much again is solved for, so that
-    # the motion can always go on from what is committed.
+    # Seconds of plan that are committed at a time. TOPP-RA solves for twice as much, so
+    # that the motion can always continue.
     chunk: float = 0.96
-    # Seconds of smoothed plan kept ahead of the clock.
+    # Seconds of smoothed plan ahead of the clock.
     lookahead: float = 1.0
 
     def check(self) -> None:
-        """Raises InputError unless the smoother can work so."""
+        """Raises InputError unless every field is valid."""
         # At least one period of its updates; and two chunks must fit into the 3 s that
         # the generator has written ahead, less what it writes at a time.
         check_number("The smoother's chunk", self.chunk, UPDATE_PERIOD, 1.4)
@@ -86,36 +86,36 @@ class SmootherConfig:
 
 @dataclass(kw_only=True)
 class TrainedPolicy:
-    """The learned policy."""
+    """A trained policy."""
 
-    # Weights, or the name of a shipped variant, such as randomized; the shipped policy
-    # of the robot if not given.
+    # Weights, or the name of a shipped variant, such as randomized; the robot's main
+    # shipped policy by default.
     weights: Path | None = None
 
 
 @dataclass(kw_only=True)
 class ExternalAction:
-    """The diagram's input port "action" takes the place of the policy."""
+    """No policy: the diagram exports the input port "action"."""
 
 
 @dataclass(kw_only=True)
 class ExternalTargets:
-    """The diagram's input port "desired_state" is the PD's: there is only the plant."""
+    """The plant alone: the diagram exports its input port "desired_state"."""
 
 
-# Hashable: batches keep one diagram of each kind.
+# Hashable, since batches cache one diagram of each kind.
 @dataclass(kw_only=True, unsafe_hash=True)
 class Disturbances:
-    """Which systems a diagram has for domains unlike the model; see :mod:`.domain`.
+    """Systems that simulate a world unlike the model, see :mod:`.domain`.
 
-    They do nothing until SetDomain tells them what.
+    They have no effect until SetDomain sets a domain.
     """
 
-    # Latency and strength of the motors.
+    # Simulate latency and strength of the motors.
     actuation: bool = False
-    # Forces on the trunk.
+    # Apply forces to the trunk.
     pushes: bool = False
-    # Errors of what the policy sees of the robot's state.
+    # Add sensor errors to the state that the policy observes.
     sensors: bool = False
 
 
@@ -127,31 +127,31 @@ def _visualization() -> VisualizationConfig:
 
 @dataclass(kw_only=True)
 class Scenario:
-    """Everything that a diagram and its simulator are made of."""
+    """Everything that defines a diagram and its simulator."""
 
-    # One of loco_drake.models.robots.ROBOTS.
+    # Robot: go2 or a1.
     robot: str = "go2"
-    # Contact, time step and friction.
+    # Contact solver, time step and friction.
     plant: PlantConfig = field(default_factory=PlantConfig)
-    # Where the motion to be tracked comes from.
+    # Source of the motion to track.
     reference: GeneratedReference | MotionReference | PlanReference = field(
         default_factory=GeneratedReference
     )
-    # How the motion is re-timed; without it the plan is tracked as it was written.
+    # Re-timing of the motion; null to track it as it is.
     smoother: SmootherConfig | None = field(default_factory=SmootherConfig)
-    # What drives the joints.
+    # Policy that controls the joints.
     policy: TrainedPolicy | ExternalAction | ExternalTargets = field(
         default_factory=TrainedPolicy
     )
-    # What there is between policy and robot beyond the model.
+    # Systems that simulate a world unlike the model.
     disturbances: Disturbances = field(default_factory=Disturbances)
-    # Drake's: target_realtime_rate. The integrator follows from the plant's contact.
+    # Only target_realtime_rate; the integrator follows from plant.contact.
     simulator: SimulatorConfig = field(default_factory=SimulatorConfig)
-    # Drake's: what Meshcat shows, and how often.
+    # Drake's configuration of Meshcat.
     visualization: VisualizationConfig = field(default_factory=_visualization)
 
     def check(self) -> None:
-        """Raises InputError unless every field is sound."""
+        """Raises InputError unless every field is valid."""
         check_choice("robot", self.robot, ROBOTS)
         self.plant.check()
         if isinstance(self.reference, GeneratedReference):
@@ -172,16 +172,16 @@ class Scenario:
 def LoadScenario(
     *, filename: Path | None = None, data: str | None = None, overlay: str | None = None
 ) -> Scenario:
-    """Returns the scenario in a YAML file or text, defaults filled in.
+    """Returns the scenario in a YAML file or text, with defaults for missing fields.
 
     Args:
-        filename: a YAML file; or
-        data: YAML text.
-        overlay: YAML text that overrides fields of the above.
+        filename: a YAML file.
+        data: YAML text, instead of a file.
+        overlay: YAML text that overrides fields.
 
     Raises:
-        InputError: if a file cannot be read, a field is unknown or of a wrong type, or
-            a value is out of its bounds.
+        InputError: if a file cannot be read, or a field is unknown, has the wrong type
+            or is out of its bounds.
     """
     if filename is not None:
         data = _read(Path(filename))
@@ -216,7 +216,7 @@ def _overlaid(scenario: Scenario, text: str) -> Scenario:
     try:
         result = yaml_load_typed(schema=Scenario, data=text, defaults=scenario)
     except Exception as error:
-        # The loader raises whatever the YAML library and the types raise.
+        # The YAML library and the types raise many kinds.
         reason = " ".join(str(error).split())[:300] or type(error).__name__
         raise InputError(f"This scenario cannot be read: {reason}") from None
     assert isinstance(result, Scenario)

@@ -1,4 +1,4 @@
-"""How a locomotion diagram is simulated: its simulator, and how an episode starts."""
+"""Simulator of a locomotion diagram, and start of an episode."""
 
 import math
 from collections.abc import Iterator
@@ -25,15 +25,15 @@ _TOLERANCE = 1e-6  # of a control period; context times are sums of steps
 
 
 class LocomotionSimulator(Simulator):
-    """A Simulator that holds the quaternion of each robot's base at length one.
+    """A Simulator that keeps the base quaternion of each robot at length one.
 
-    Drake's discrete plants never normalize it, and no system can write the state of
-    another. So AdvanceTo stops at the end of each control period, where the state is
-    anybody's to set, and normalizes it there; the steps taken are the same.
+    Drake's discrete plants never normalize it, and no system can change the state of
+    another. AdvanceTo therefore stops at the end of each control period and normalizes
+    the quaternion in the Context. The steps of the plant do not change.
 
     Args:
-        diagram: of :func:`.diagram.MakeLocomotionDiagram`, or one that holds it or the
-            systems of :func:`.diagram.AddLocomotion`, at any depth.
+        diagram: a locomotion diagram, or one that contains locomotion diagrams or the
+            systems of :func:`.diagram.AddLocomotion` at any depth.
     """
 
     def __init__(self, diagram: Diagram) -> None:
@@ -83,12 +83,11 @@ def MakeSimulator(diagram: Diagram, scenario: Scenario) -> LocomotionSimulator:
 
     Args:
         diagram: see :class:`LocomotionSimulator`.
-        scenario: what the diagram was made of.
+        scenario: the scenario that the diagram was made from.
 
     Raises:
-        InputError: if the diagram is of another scenario, or is to be simulated by
-            CENIC, which finds plants only among the root's own systems, and holds it
-            deeper.
+        InputError: if the diagram was made from another scenario, or CENIC would have
+            to simulate a nested locomotion diagram, whose plant it does not find.
     """
     parts = list(_locomotions(diagram))
     if not parts:
@@ -125,25 +124,24 @@ def StartEpisode(
     domain: Domain | None = None,
     diagram: Diagram | None = None,
 ) -> None:
-    """Starts anew at time 0, the robot in the first state of its plan.
+    """Starts an episode at time 0 with the robot in the first state of its plan.
 
-    All of the simulator's Context returns to its default, so that what follows is what
-    would follow in a new diagram, to the last bit; values that you fixed at input ports
-    stay. The simulator is initialized, once, with the robot in place.
+    Resets the whole Context to its default, so the episode equals one in a new diagram
+    bit for bit. Values that you fixed at input ports remain. Initializes the simulator.
 
     Args:
-        simulator: of a locomotion diagram, or of one that holds it; see
-            :class:`LocomotionSimulator`.
-        gait: of a generated reference, instead of the scenario's.
-        seed: of a generated reference, instead of the scenario's.
-        plan: of a reference that plays plans, instead of the scenario's.
-        domain: in what the world differs from the model; the scenario must have the
-            disturbances for it.
-        diagram: which one these concern, where the simulator's holds several.
+        simulator: the simulator of a diagram as in :class:`LocomotionSimulator`.
+        gait: replaces the scenario's gait of a generated reference.
+        seed: replaces the scenario's seed of a generated reference.
+        plan: replaces the plan of a reference that plays plans.
+        domain: how the world differs from the model; the scenario must have the
+            disturbances that it needs.
+        diagram: the locomotion diagram that these arguments apply to, if there are
+            several.
 
     Raises:
-        InputError: if the reference cannot take these, or a continuous plant is to be
-            integrated by anything but CENIC.
+        InputError: if the reference does not accept an argument, or a continuous plant
+            has another integrator than CENIC.
     """
     root, context = simulator.get_system(), simulator.get_mutable_context()
     parts = list(_locomotions(root))
@@ -171,7 +169,7 @@ def StartEpisode(
 
 
 def _set_reference(diagram: Diagram, root: Context, **given: Any) -> None:
-    """Tells the diagram's reference what is not None."""
+    """Passes the arguments that are not None to the reference."""
     given = {name: value for name, value in given.items() if value is not None}
     if not given:
         return
@@ -193,11 +191,11 @@ def _set_reference(diagram: Diagram, root: Context, **given: Any) -> None:
 
 
 def _place_on_plan(diagram: Diagram, root: Context) -> None:
-    """Puts a robot that has a plan where that starts."""
+    """Sets the robot to the first state of its plan, if it has one."""
     if not diagram.HasSubsystemNamed("plan_state"):
         return
     if diagram.HasSubsystemNamed("smoother"):
-        # Its plan exists only after initialization.
+        # The smoothed plan exists only after initialization.
         smoother = diagram.GetSubsystemByName("smoother")
         smoother.ExecuteInitializationEvents(smoother.GetMyMutableContextFromRoot(root))
     plan_state = diagram.GetSubsystemByName("plan_state")
@@ -214,7 +212,7 @@ def _place_on_plan(diagram: Diagram, root: Context) -> None:
 
 
 def _locomotions(diagram: Diagram) -> Iterator[Diagram]:
-    """Yields the diagrams, this one or within it, that hold a robot and its plant."""
+    """Yields all locomotion diagrams in ``diagram``, including itself."""
     if diagram.HasSubsystemNamed("robot_state"):
         yield diagram
     for system in diagram.GetSystems():

@@ -1,4 +1,4 @@
-"""The system that re-times a plan to what the actuators can do."""
+"""The system that re-times a plan to satisfy the limits of the actuators."""
 
 from dataclasses import replace
 from typing import Any
@@ -14,27 +14,26 @@ from .scenario import SmootherConfig
 
 
 class ToppraSmoother(LeafSystem):
-    """Re-times the incoming plan so that joints and base keep :func:`path_limits`.
+    """Re-times the incoming plan so that joints and base satisfy :func:`path_limits`.
 
     .. pydrake_system::
 
         name: ToppraSmoother
         input_ports:
-        - plan: a Plan as it was written
+        - plan: abstract, Plan; before smoothing
         output_ports:
-        - plan: a Plan as it is to be played
-        - path_time: how much of the input has been used up, s, size 1; tells the
-          producer when to write more
+        - plan: abstract, Plan; smoothed
+        - path_time: vector (1,), how much of the input has been used; s
 
-    The output plan runs on the context's clock and is never faster than the input;
-    it grows by chunks as the clock comes near its end and the input reaches far
-    enough, and what has been played long ago is dropped. An input that is not the same
-    motion written further, such as a player's new plan, is begun at once.
+    The output is on the Context's clock and is never faster than the input. It is
+    extended by one chunk whenever it reaches less than ``lookahead`` ahead and the
+    input is long enough; samples in the past are dropped. If the input is replaced by
+    another plan, such as a player's new one, the system starts it at once.
 
     Args:
-        robot: whose limits hold.
+        robot: the robot.
         config: chunk and look-ahead.
-        limits: instead of the robot's own.
+        limits: limits that replace the robot's own.
 
     Raises:
         InputError: if a number in ``config`` is out of its bounds.
@@ -78,7 +77,7 @@ class ToppraSmoother(LeafSystem):
         return progress
 
     def _initialize(self, context: Context, state: State) -> EventStatus:
-        # A clone of a context that has run goes on as it would have.
+        # The clone of a Context that has run continues as the original would.
         if self._get(context).goes_on_in(self._plan_in.Eval(context)):
             return EventStatus.DidNothing()
         return self._update(context, state)
@@ -92,7 +91,7 @@ class ToppraSmoother(LeafSystem):
         return EventStatus.Succeeded()
 
     def _extended(self, progress: Progress, raw: Plan, now: float) -> Progress:
-        """Returns ``progress`` with as many chunks added as are due and possible."""
+        """Returns ``progress`` with all chunks added that are due and available."""
         ahead = now + self._config.lookahead + UPDATE_PERIOD
         if not progress.goes_on_in(raw):
             progress = Progress(standing_plan(self._robot, now))
