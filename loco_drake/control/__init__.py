@@ -1,1 +1,1 @@
-"""What training computes without a diagram: plan, observation, action, reward."""
+"""Control without a diagram: plan, re-timing, observation, action, reward, actor."""

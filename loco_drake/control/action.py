@@ -1,4 +1,4 @@
-"""From plan and action to the set-points of the joints' PD controllers."""
+"""PD set-points from plan and action."""
 
 from functools import lru_cache
 
@@ -23,26 +23,26 @@ _MAX_LOAD = 2.5  # robot weights
 
 
 def joint_targets(set_points: Array, action: Array) -> Array:
-    """Returns what the PD is sent, [q_d, v_d], shape (..., 2 J).
+    """Returns the desired state of the PD, [q_d, v_d], shape (..., 2 J).
 
-    They are q_d = set_points + ACTION_SCALE * action and v_d = 0: the desired velocity
-    is within the set-points, since Drake's CENIC integrator (1.51) takes it with the
-    wrong sign; the torque kp (q_d - q) - kd v is the same either way.
+    q_d = set_points + ACTION_SCALE * action, and v_d = 0. The set-points contain the
+    desired velocity, because Drake's CENIC integrator (1.51) applies v_d with the wrong
+    sign. The torque kp (q_d - q) - kd v is the same.
 
     Args:
-        set_points: of :func:`set_points` at the end of the control period, (..., J).
-        action: the policy's, shape (..., J).
+        set_points: :func:`set_points` at the end of the control period, rad, (..., J).
+        action: the policy's action, shape (..., J).
     """
     q_d = set_points + ACTION_SCALE * action
     return np.concatenate((q_d, np.zeros_like(q_d)), axis=-1)
 
 
-@lru_cache(maxsize=4)  # A plan is immutable, and sampled fifty times a second.
+@lru_cache(maxsize=4)  # A plan is immutable, and sampled at 50 Hz.
 def set_points(robot: Robot, plan: Plan) -> Array:
-    """Returns the set-points of the PD that follow ``plan``, rad, shape (N, J).
+    """Returns the PD set-points that track ``plan``, rad, shape (N, J).
 
-    They are q + (kd v + tau) / kp, with the gains of the PD and the torques tau of
-    :func:`feed_forward_torques`: all act through the position.
+    They are q + (kd v + tau) / kp with the PD gains and the torques tau of
+    :func:`feed_forward_torques`.
     """
     torques = feed_forward_torques(robot, plan)
     points = plan.q[JOINTS] + (robot.kd * plan.v[JOINT_VELOCITIES] + torques) / robot.kp
@@ -51,14 +51,13 @@ def set_points(robot: Robot, plan: Plan) -> Array:
 
 
 def feed_forward_torques(robot: Robot, plan: Plan) -> Array:
-    """Returns joint torques (N, J) in Nm that a plan takes, roughly.
+    """Returns approximate joint torques of a plan, N m, shape (N, J).
 
-    The feet in contact share equally the vertical force m (g + a) that the planned
-    acceleration a of the base asks for, and the joints balance it: tau = -J^T f. To
-    this comes what accelerates each joint, with its inertia in the usual stance; the
-    legs' weight and their coupling are left out. A feed-forward of this kind is what
-    lets trackers learn from few samples (Fuchioka et al. 2023, OPT-Mimic): it spares
-    the policy from having to learn first that robots have mass.
+    The feet in contact share the vertical force m (g + a), where a is the base's
+    planned acceleration, equally. The joints balance this force, tau = -J^T f, and
+    accelerate their own inertia in the standing pose. The weight and coupling of the
+    legs are neglected. Such a feed-forward reduces the samples that a tracker needs
+    (Fuchioka et al. 2023, OPT-Mimic).
     """
     contacts = plan.contacts
     load = np.clip(1 + plan.vdot[VELOCITY][:, 2] / GRAVITY, 0.0, _MAX_LOAD)

@@ -1,9 +1,9 @@
-"""The policy's network, left-right symmetric, and its weights on disk.
+"""The policy network, left-right symmetric, and its weights file.
 
-The robots are their own mirror images, so that what is good for one is good, mirrored,
-for its image. Networks that are averaged over both (Abdolhosseini et al. 2019, "On
-learning symmetric locomotion") know this from the start: whatever they learn of one
-side holds for the other.
+The robots are mirror-symmetric: the mirror image of a good action is good for the
+mirrored observation. The network averages over both (Abdolhosseini et al. 2019, "On
+learning symmetric locomotion"), so whatever it learns about one side holds for the
+other.
 """
 
 from dataclasses import asdict, dataclass, field
@@ -36,7 +36,7 @@ from loco_drake.motion.motion import FPS
 
 KIND = "policy"
 OBSERVATION_CLIP = 5.0  # standard deviations
-# Parts of the observation that take the base's position in the world, or its velocity.
+# Parts of the observation that need the base's position in the world or its velocity.
 PRIVILEGED = ("v_WB_H", "height", "plan_p_H")
 
 
@@ -46,7 +46,7 @@ _AXIAL = (np.arange(3), MIRROR_AXIAL)
 _JOINTS = (MIRROR_JOINTS, MIRROR_JOINT_SIGNS)
 _LEGS = (MIRROR_LEGS, np.ones(4))
 
-# What each part of the observation is made of, once or several times in a row.
+# Permutation and signs that mirror a part of the observation; parts may repeat them.
 _PARTS = {
     "gravity_B": _POLAR,
     "w_WB_B": _AXIAL,
@@ -85,23 +85,23 @@ Values = TypeVar("Values", NDArray[np.float64], NDArray[np.float32], Tensor)
 
 
 def mirror_observations(observations: Values) -> Values:
-    """Returns what the mirror image observes, shape (..., OBSERVATION_SIZE)."""
+    """Returns mirrored observations, shape (..., OBSERVATION_SIZE)."""
     if isinstance(observations, Tensor):
         return observations[..., _SOURCES] * _SIGNS_TORCH
     return (observations[..., _SOURCES] * _SIGNS).astype(observations.dtype)
 
 
 def mirror_actions(actions: Values) -> Values:
-    """Returns what the mirror image does, shape (..., 12)."""
+    """Returns mirrored actions, shape (..., 12)."""
     if isinstance(actions, Tensor):
         return actions[..., MIRROR_JOINTS] * _JOINT_SIGNS_TORCH
     return (actions[..., MIRROR_JOINTS] * MIRROR_JOINT_SIGNS).astype(actions.dtype)
 
 
 def unprivileged_mask() -> Tensor:
-    """Returns 0 for privileged parts of the observation, else 1, (OBSERVATION_SIZE,).
+    """Returns a mask of the observation, 0 where it is privileged, (OBSERVATION_SIZE,).
 
-    Normalized observations are multiplied by it: hidden parts are always at their mean.
+    Multiplying normalized observations by it sets privileged parts to their mean.
     """
     return torch.cat(
         [
@@ -113,17 +113,17 @@ def unprivileged_mask() -> Tensor:
 
 @dataclass(kw_only=True)
 class ActorConfig:
-    """What a policy was trained for; weights that differ are refused.
+    """The properties that a policy was trained with; a mismatch is refused.
 
     Attributes:
         robot: name of the robot.
-        labels: gait labels that it was trained on.
+        labels: gait labels in the training.
         hidden: widths of the hidden layers.
         observation_layout: names and sizes of the parts of the observation.
         action_scale: rad per unit of action.
         rate: actions per second.
-        privileged: whether it sees what a robot outside simulation does not know well,
-            :data:`PRIVILEGED`.
+        privileged: whether the policy observes :data:`PRIVILEGED` parts, which a robot
+            outside simulation does not know well.
     """
 
     robot: str
@@ -138,10 +138,10 @@ class ActorConfig:
 
 
 class Actor(nn.Module):
-    """Normalises an observation and maps it to the mean action.
+    """Network that normalizes an observation and returns the mean action.
 
-    The layers are applied to the observation and to its mirror image, and averaged: the
-    action of a mirrored observation is the mirrored action.
+    Averages the layers over the observation and its mirror image, so that mirrored
+    observations give mirrored actions.
     """
 
     mean: Tensor
@@ -175,8 +175,8 @@ class Actor(nn.Module):
 def save_actor(actor: Actor, path: Path, *, half: bool = False) -> None:
     """Writes the policy's weights.
 
-    In half precision the normaliser's statistics are stored in full: their range is
-    larger than 16 bits hold.
+    The normalizer's statistics are always stored in full precision, since they exceed
+    the range of 16 bits.
     """
     tensors = dict(actor.state_dict())
     if half:

@@ -1,6 +1,6 @@
-"""In what an episode's world differs from the model.
+"""How the world of an episode differs from the model.
 
-Domain randomization (Tobin et al. 2017; Tan et al. 2018, "Sim-to-real") draws a domain
+Domain randomization (Tobin et al. 2017; Tan et al. 2018, "Sim-to-real") draws a Domain
 for each episode; :mod:`loco_drake.systems.domain` sets it in a Context.
 """
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 MAX_LATENCY = 0.1  # s
 _JOINTS = 12
-# Name and size of each part of an error, in order.
+# Name and size of each part of a sensor error, in order.
 ERROR_LAYOUT = (
     ("orientation", 3),  # rotation vector in B, rad
     ("position", 3),  # of the base in the world, m
@@ -29,7 +29,7 @@ ERROR_LAYOUT = (
 )
 ERROR_SIZE = sum(size for _, size in ERROR_LAYOUT)
 
-# The least and most of each field of a Domain that is a number, or an array of them.
+# Bounds of the numeric fields of a Domain.
 BOUNDS = {
     "friction": (1e-3, inf),
     "stiffness": (1.0, inf),
@@ -41,7 +41,7 @@ BOUNDS = {
 
 
 class _Checked:
-    """A dataclass whose numbers are checked, and whose arrays are read-only copies."""
+    """A dataclass that checks its numbers and stores read-only copies of its arrays."""
 
     def _check(self, what: str, shapes: dict[str, int], **bounds: Any) -> None:
         for field in fields(self):  # type: ignore[arg-type]
@@ -68,12 +68,12 @@ class _Checked:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Push(_Checked):
-    """A constant force on the trunk, at its origin.
+    """A constant force at the trunk's origin.
 
     Attributes:
-        start: context time, s.
+        start: Context time, s.
         duration: s.
-        force_W: N, shape (3,).
+        force_W: force in W, N, shape (3,).
     """
 
     start: float
@@ -86,13 +86,12 @@ class Push(_Checked):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SensorErrors(_Checked):
-    """What is wrong with the measured state; the order is that of :mod:`.measurement`.
+    """Errors of the measured state, in the order of :data:`ERROR_LAYOUT`.
 
     Attributes:
         bias: constant errors, shape (ERROR_SIZE,).
-        white: standard deviations of errors that are independent from one sample to
-            the next, shape (ERROR_SIZE,).
-        seed: of the latter.
+        white: standard deviations of the white noise, shape (ERROR_SIZE,).
+        seed: seed of the white noise.
     """
 
     bias: Array
@@ -106,25 +105,24 @@ class SensorErrors(_Checked):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Domain(_Checked):
-    """One world; whatever is not given is as in the model.
+    """The parameters of one world; those that are not given are as in the model.
 
-    Like a Plan it is immutable, and a copy of it is the same object.
+    A Domain is immutable, and a copy is the same object.
 
     Attributes:
-        friction: Coulomb coefficient of the ground; a contact has the harmonic mean of
+        friction: Coulomb coefficient of the ground; a contact uses the harmonic mean of
             this and the feet's.
-        stiffness: of the ground in N/m, in series with that of the feet.
+        stiffness: stiffness of the ground, N/m, in series with that of the feet.
         payload: mass added to the trunk, kg.
-        com_shift: of the trunk's centre of mass, in B, m, shape (3,).
-        strength: torque of each motor over that of its model, for the same set-point
-            and state, shape (12,).
-        latency: from the choice of a set-point to its effect on the motors, s; whole
-            steps of the physics.
-        pushes: in any order; where they overlap, forces add up.
-        sensors: errors of what the robot measures.
+        com_shift: shift of the trunk's centre of mass in B, m, shape (3,).
+        strength: torque of each motor over that of its model at the same set-point and
+            state, shape (12,).
+        latency: delay of the set-points, s, rounded to whole steps of the plant.
+        pushes: in any order; overlapping forces add up.
+        sensors: errors of the measured state.
 
     Raises:
-        InputError: if a number is not within its :data:`BOUNDS`.
+        InputError: if a number is not within :data:`BOUNDS`.
     """
 
     friction: float | None = None
@@ -140,7 +138,7 @@ class Domain(_Checked):
         self._check("domain", {"com_shift": 3, "strength": _JOINTS}, **BOUNDS)
 
     def needs(self, name: str) -> bool:
-        """Returns whether it takes the disturbing system of this name."""
+        """Returns whether this domain requires the disturbance ``name``."""
         if name == "actuation":
             return self.strength is not None or self.latency > 0
         return bool(self.pushes) if name == "pushes" else self.sensors is not None

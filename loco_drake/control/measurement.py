@@ -1,4 +1,4 @@
-"""What a robot measures of its state, which is not quite its state."""
+"""The measured state: the true state with sensor errors."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def error_vector(**sizes: float) -> Array:
-    """Returns an error (ERROR_SIZE,) whose named parts have these values, others 0."""
+    """Returns an error (ERROR_SIZE,) with the named parts set and all others 0."""
     unknown = sizes.keys() - dict(ERROR_LAYOUT).keys()
     if unknown:
         raise TypeError(f"errors have no part {', '.join(sorted(unknown))}")
@@ -27,7 +27,7 @@ def error_vector(**sizes: float) -> Array:
 
 
 def draw_error(errors: SensorErrors, sample: int) -> Array:
-    """Returns the error of one sample of the clock, (ERROR_SIZE,): always the same."""
+    """Returns the error (ERROR_SIZE,) of one sample of the clock, deterministically."""
     random = np.random.default_rng((errors.seed, sample))
     return errors.bias + errors.white * random.standard_normal(ERROR_SIZE)
 
@@ -35,8 +35,8 @@ def draw_error(errors: SensorErrors, sample: int) -> Array:
 def measure(state: Array, error: Array) -> Array:
     """Returns measured states [q, v], shape (..., 37).
 
-    What the policy sees of robot and plan is computed from these, so that an error of
-    an encoder shows in all that depends on it.
+    The observation is computed from the measured state, so an encoder error affects
+    every part that depends on it.
 
     Args:
         state: the plant's [q, v], shape (..., 37).

@@ -1,4 +1,4 @@
-"""What the policy sees: the robot's state and the plan relative to it."""
+"""The observation of the policy: the robot's state, and the plan relative to it."""
 
 from dataclasses import dataclass
 
@@ -28,12 +28,12 @@ from loco_drake.motion.gaits import ONE_HOT, ONE_HOT_SIZE
 
 Array = NDArray[np.float64]
 
-# Samples of the plan after the present one that are shown to the policy.
+# Samples of the plan, counted from the current one, that the policy observes.
 LOOK_AHEAD = np.array([1, 2, 4, 8])
 _K = len(LOOK_AHEAD)
 
-# Name and size of each part, in order; weights of a policy record this layout. H is
-# the base's heading frame: at the base, z up, x along the base's x in the plane.
+# Name and size of each part, in order. A policy's weights record this layout. H is the
+# heading frame: its origin is the base's, z is up, x is the base's x in the plane.
 OBSERVATION_LAYOUT = (
     ("gravity_B", 3),  # direction of gravity
     ("w_WB_B", 3),  # rad/s
@@ -56,7 +56,7 @@ OBSERVATION_SIZE = sum(size for _, size in OBSERVATION_LAYOUT)
 
 @dataclass(frozen=True)
 class Preview:
-    """What the policy is shown of its plan; any leading shape, K samples ahead.
+    """The part of a plan that the policy observes, K samples of any leading shape.
 
     Attributes:
         q: positions as in :class:`Plan`, shape (..., K, 19).
@@ -73,7 +73,7 @@ class Preview:
 
 
 def preview(plan: Plan, time: float) -> Preview:
-    """Returns what is to be shown of ``plan`` at a context time in s."""
+    """Returns the preview of ``plan`` at a Context time in s."""
     now = plan.index(time)
     k = np.minimum(now + LOOK_AHEAD, len(plan) - 1)
     return Preview(plan.q[k], plan.v[k], plan.contacts[k], plan.labels[now])
@@ -90,10 +90,10 @@ def observe(
 
     Args:
         robot: the robot.
-        ahead: what it is to do.
-        state: the robot's [q, v], its quaternion of length one, shape (..., 37).
-        action: the action being applied, shape (..., 12).
-        R_WB: the base's rotation matrix (..., 3, 3), if it is known already.
+        ahead: the plan ahead.
+        state: [q, v] with a unit quaternion, shape (..., 37).
+        action: the action in use, shape (..., 12).
+        R_WB: the base's rotation matrix (..., 3, 3), if known.
     """
     q, v = split(state)
     robots = q[..., None, :]  # against the samples ahead

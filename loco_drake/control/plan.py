@@ -1,4 +1,4 @@
-"""The one type that generator, smoother, player, policy and reward exchange."""
+"""The immutable motion that all systems exchange."""
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -17,9 +17,9 @@ from loco_drake.motion.motion import FPS, Motion
 Array = NDArray[np.float64]
 
 PLAN_DT = 1.0 / FPS
-# s between updates of what makes plans. A power of two times PLAN_DT: these events then
-# come at the very times of the control periods. With .1 s they would be 6e-17 s apart
-# at .3 s, and CENIC explodes over a step that short.
+# Update period in s of systems that output plans. As a power of two times PLAN_DT, it
+# makes these events coincide exactly with control periods. With .1 s the two would be
+# 6e-17 s apart at .3 s, and CENIC fails over a step that short.
 UPDATE_PERIOD = 4 * PLAN_DT
 _ARRAYS = ("q", "v", "vdot", "p_WF", "contacts", "labels", "path_time")
 _MAX_NORM_ERROR = 1e-3  # of quaternions
@@ -29,28 +29,28 @@ _MAX_NORM_ERROR = 1e-3  # of quaternions
 class Plan:
     """An immutable stretch of motion on its own clock, sampled every PLAN_DT.
 
-    Sample k is due at context time ``start_time + k * PLAN_DT``. ``q`` and ``v`` are
-    in the order of the robot's MultibodyPlant: ``q = [R_WB as w x y z, p_WB, joints]``
-    and ``v = [w_WB_W, v_WB_W, joint velocities]``.
+    Sample k is due at Context time ``start_time + k * PLAN_DT``. ``q`` and ``v`` are in
+    the order of the robot's MultibodyPlant: ``q = [R_WB as w x y z, p_WB, joints]`` and
+    ``v = [w_WB_W, v_WB_W, joint velocities]``.
 
-    A Plan owns its arrays, which are read-only. It is held in abstract state and
-    compared by identity; copying one returns the same object, since Drake copies all
+    A Plan owns its arrays, which are read-only. It is stored in abstract state and
+    compared by identity. Copying returns the same object, because Drake copies all
     abstract state at each unrestricted update.
 
     Attributes:
-        start_time: context time in s of the first sample.
-        q: positions, shape (N, 7 + J).
-        v: velocities, shape (N, 6 + J).
-        vdot: accelerations, the time derivatives of ``v``, shape (N, 6 + J).
+        start_time: Context time of the first sample, s.
+        q: positions, m and rad, shape (N, 7 + J).
+        v: velocities, m/s and rad/s, shape (N, 6 + J).
+        vdot: time derivatives of ``v``, shape (N, 6 + J).
         p_WF: centres of the toe spheres in m, shape (N, 4, 3).
-        contacts: whether each foot is meant to be on the ground, shape (N, 4).
+        contacts: whether each foot should be on the ground, shape (N, 4).
         labels: row of :data:`loco_drake.motion.gaits.ONE_HOT`, shape (N,).
-        path_time: seconds of the unsmoothed motion that have passed, shape (N,);
-            the smoother slows this clock down where the robot cannot follow.
-        open_ended: whether whoever made the plan will write more of it.
+        path_time: time in the motion before smoothing, s, shape (N,); the smoother
+            slows this clock down where the robot could not keep up.
+        open_ended: whether the producer will extend the plan.
 
     Raises:
-        InputError: if an array has the wrong type or shape, or holds what cannot be.
+        InputError: if an array has an invalid type, shape or value.
     """
 
     start_time: float
@@ -88,14 +88,14 @@ class Plan:
                     f"A plan's q must have the shape (N, 7 + J), N at least 1, and its "
                     f"{name} one that goes with that, not {given.shape}."
                 )
-            # A copy: whoever made the array may hold it, or a view of it.
+            # A copy, since the caller may hold the array or a view of it.
             own: NDArray[Any] = given.astype(wanted)
             object.__setattr__(self, name, _read_only(own))
         self._check_values()
         object.__setattr__(self, "q", _read_only(unit_base(self.q)))
 
     def _check_values(self) -> None:
-        """Raises InputError if a number in it cannot be."""
+        """Raises InputError if an array has an invalid value."""
         finite = all(np.isfinite(getattr(self, name)).all() for name in _ARRAYS)
         if not (finite and np.isfinite(self.start_time)):
             raise InputError("A plan's numbers and start time must be finite.")
@@ -122,7 +122,7 @@ class Plan:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Unpickled arrays can be written to; those of a Plan cannot.
+        # Unpickled arrays would be writable.
         return Plan, tuple(getattr(self, field.name) for field in fields(self))
 
     @cached_property
@@ -139,7 +139,7 @@ class Plan:
 
     @property
     def end_time(self) -> float:
-        """Context time in s of the last sample."""
+        """Context time of the last sample, s."""
         return self.start_time + (len(self) - 1) * PLAN_DT
 
     def tail(self, first: int) -> "Plan":
@@ -148,7 +148,7 @@ class Plan:
         return replace(self, start_time=self.start_time + first * PLAN_DT, **arrays)
 
     def index(self, time: float) -> int:
-        """Returns the sample nearest to ``time``, at the ends the first or last."""
+        """Returns the index of the sample nearest to ``time``, clamped to the plan."""
         k = round((time - self.start_time) / PLAN_DT)
         return min(max(k, 0), len(self) - 1)
 
@@ -169,7 +169,7 @@ def make_plan(
     path_time: Array | None = None,
     open_ended: bool = False,
 ) -> Plan:
-    """Returns a Plan; toes follow from the robot's model, accelerations from ``v``."""
+    """Returns a Plan; computes toes from the joints and accelerations from ``v``."""
     p_BF = robot.toe_positions(q[JOINTS])
     p_WF = q[POSITION][:, None] + quat_rotate(q[ORIENTATION][:, None], p_BF)
     if path_time is None:
@@ -179,7 +179,7 @@ def make_plan(
 
 
 def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> Plan:
-    """Returns ``motion`` as a Plan for ``robot``.
+    """Returns ``motion`` as a Plan of ``robot``.
 
     Raises:
         InputError: if the motion is not at :data:`loco_drake.motion.motion.FPS`, is of
@@ -224,7 +224,7 @@ def join_plans(first: Plan, second: Plan) -> Plan:
 
 
 def standing_plan(robot: Robot, start_time: float = 0.0) -> Plan:
-    """Returns the plan to stand still; what ports hold before anything is planned."""
+    """Returns a plan to stand still, the default value of ports."""
     q = np.concatenate(([1, 0, 0, 0, 0, 0, robot.stand_height], robot.stand_joints))
     return make_plan(
         robot,

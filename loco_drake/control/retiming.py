@@ -1,4 +1,4 @@
-"""TOPP-RA along a plan: slow down where the actuators cannot follow, never speed up."""
+"""TOPP-RA along a plan, which slows it to the limits and never speeds it up."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -25,22 +25,22 @@ from loco_drake.models.robots import Robot
 
 Array = NDArray[np.float64]
 
-# toppra tells of infeasible problems through its logger; here they are results.
+# toppra logs infeasible problems as errors; here they are results.
 toppra.setup_logging("ERROR")
 
-# The path clock may slow from full speed to rest in no less than this many seconds:
-# what it does to the plan's speed is done to the whole robot, which is in the air at
-# times, and on the ground brakes at no more than friction allows.
+# The path clock takes at least this long, in s, to slow from full speed to rest. It
+# decelerates the whole robot, which cannot brake in the air, nor on the ground beyond
+# friction.
 _CLOCK_STOP_TIME = 0.5
 
 
 @dataclass(frozen=True)
 class PathLimits:
-    """What each coordinate of a path can do.
+    """Limits of each coordinate of a path.
 
     Attributes:
-        speed: at most this, in both directions, shape (D,).
-        acceleration: from the first to the second, shape (D, 2).
+        speed: in both directions, shape (D,).
+        acceleration: lower and upper, shape (D, 2).
     """
 
     speed: Array
@@ -50,13 +50,13 @@ class PathLimits:
 def path_limits(robot: Robot) -> PathLimits:
     """Returns the robot's limits on its joints (rad) and the height of its base (m).
 
-    The acceleration that a joint can give its leg is ``effort_limit /
-    joint_inertia``: an upper bound for a leg in swing, where fast joint
-    motion happens. A leg in stance also carries load, but hardly accelerates.
+    A joint can accelerate its leg by at most ``effort_limit / joint_inertia``. This
+    bound applies to a leg in swing, where fast motion happens. A leg in stance also
+    carries load, but hardly accelerates.
 
-    The base cannot fall faster than gravity makes it, since feet push but do not
-    pull. Motion of an animal or robot smaller than this one asks for that where all
-    feet are in the air; slowed until it falls like any body, it can be followed.
+    The base cannot accelerate downward faster than gravity, since feet push but do not
+    pull. Motion of an animal or robot smaller than this one violates this limit in
+    flight; slowed until it satisfies the limit, it can be tracked.
     """
     joints = robot.effort_limits / robot.joint_inertia
     return PathLimits(
@@ -68,10 +68,10 @@ def path_limits(robot: Robot) -> PathLimits:
 
 
 class _ClockedPath(AbstractGeometricPath):
-    """Coordinates over plan time, and plan time itself as the last of them.
+    """Coordinates over plan time, with plan time itself as the last coordinate.
 
-    Limiting the speed of that last coordinate to 1 is what keeps TOPP-RA, which is
-    time-optimal, from playing the plan faster than it was written.
+    A limit of 1 on the speed of this last coordinate prevents TOPP-RA, which is
+    time-optimal, from playing the plan faster than it is.
     """
 
     def __init__(self, spline: CubicSpline, start: float, end: float) -> None:
@@ -97,7 +97,7 @@ class _ClockedPath(AbstractGeometricPath):
 
 
 class _FreeEndTOPPRA(TOPPRA):
-    """TOPP-RA that may end at any speed up to ``sd_end``, not at ``sd_end`` itself."""
+    """TOPP-RA that may end at any speed up to ``sd_end``."""
 
     def compute_controllable_sets(self, sdmin: float, sdmax: float) -> Array:
         return super().compute_controllable_sets(0.0, sdmax)
@@ -126,25 +126,24 @@ def retime(
     commit: float,
     start_rate: float = 1.0,
 ) -> Clock:
-    """Re-times the path through ``waypoints`` so that it keeps within ``limits``.
+    """Re-times the path through ``waypoints`` to satisfy ``limits``.
 
-    Where the plan is feasible as written it is left exactly alone. Otherwise TOPP-RA
-    (Pham and Pham 2018) finds the fastest clock that is never faster than the plan.
+    A feasible plan is left exactly unchanged. Otherwise TOPP-RA (Pham and Pham 2018)
+    finds the fastest clock that is never faster than the plan.
 
     Args:
-        times: plan times of the waypoints in s, shape (N,); may reach beyond
+        times: plan times of the waypoints, s, shape (N,). They may extend beyond
             ``start`` and ``end``, which makes the spline independent of both.
-        waypoints: coordinates there, shape (N, D).
-        limits: what must hold.
-        start: plan time at which to start.
-        end: plan time up to which the limits are to be satisfied.
-        commit: plan time at which to stop; what lies beyond, up to ``end``, only
-            makes sure that the motion can go on from there.
-        start_rate: ds/dt at ``start``. Lowered if the limits cannot be met from it.
+        waypoints: coordinates at these times, shape (N, D).
+        limits: limits to satisfy.
+        start: plan time at the start, s.
+        end: plan time up to which to satisfy the limits, s.
+        commit: plan time at which to stop, s. The rest, up to ``end``, ensures that
+            the motion can continue.
+        start_rate: ds/dt at ``start``; lowered if it makes the limits infeasible.
 
     Returns:
-        The clock from ``start`` on, at multiples of PLAN_DT of real time, for as long
-        as it has not passed ``commit``.
+        The clock from ``start`` up to ``commit``, at multiples of PLAN_DT.
     """
     spline = CubicSpline(times, waypoints)
     count = max(2, round((end - start) / (0.5 * PLAN_DT)))
@@ -180,7 +179,7 @@ def _solve(
     path = _ClockedPath(spline, grid[0], grid[-1])
     solver = _FreeEndTOPPRA(constraints, path, gridpoints=grid, solver_wrapper="seidel")
     controllable = np.sqrt(solver.compute_controllable_sets(0.0, 1.0)[0])
-    # A plan that starts outside the limits leaves no choice but a jump of the clock.
+    # If the plan violates the limits at its start, the clock has to jump.
     rate = float(np.clip(start_rate, controllable[0], controllable[1]))
     _, rates, _ = solver.compute_parameterization(rate, 1.0)
     if rates is None or np.isnan(rates).any():
@@ -204,13 +203,13 @@ def _sample(grid: Array, rates: Array, commit: float) -> Clock:
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """How far a plan has been re-timed; immutable, and a copy is the same object.
+    """The state of re-timing a plan. It is immutable, and a copy is the same object.
 
     Attributes:
-        plan: what has been re-timed.
+        plan: the re-timed plan.
         path_time: plan time of its last sample, s.
-        rate: ds/dt there.
-        source: the plan that it was made of; None before there is anything.
+        rate: ds/dt of its last sample.
+        source: the plan that was re-timed; None at first.
     """
 
     plan: Plan
@@ -222,9 +221,9 @@ class Progress:
         return self
 
     def goes_on_in(self, raw: Plan) -> bool:
-        """Returns whether ``raw`` holds the sample that was re-timed last.
+        """Returns whether ``raw`` contains the sample that was re-timed last.
 
-        If it does not, it is another motion, not the same one written further.
+        If it does not, it is another motion rather than an extension of the same one.
         """
         source = self.source
         if source is None or raw is source:
@@ -239,10 +238,10 @@ class Progress:
 def smooth_chunk(
     robot: Robot, limits: PathLimits, progress: Progress, raw: Plan, chunk: float
 ) -> Progress | None:
-    """Returns ``progress`` with one more chunk, or None if ``raw`` is too short.
+    """Returns ``progress`` extended by one chunk, or None if ``raw`` is too short.
 
-    An open-ended plan must reach two chunks ahead; of a plan that ends, the last
-    chunk may be shorter.
+    An open-ended plan must reach two chunks ahead. The last chunk of other plans may be
+    shorter.
     """
     begun = progress.source is not None
     start = progress.path_time if begun else float(raw.path_time[0])
@@ -251,7 +250,7 @@ def smooth_chunk(
         return None
     end = min(start + 2 * chunk, last)
     commit = min(start + chunk, last)
-    # A margin on both sides makes the spline the same from one window to the next.
+    # With a margin on both sides, the splines of consecutive windows agree.
     margin = 12 * PLAN_DT
     window = slice(
         int(np.searchsorted(raw.path_time, start - margin)),
@@ -269,7 +268,7 @@ def smooth_chunk(
     if not begun:
         plan = _follow(robot, raw, window, clock, progress.plan.start_time)
     else:
-        # The first sample is the last of what is committed already.
+        # The first sample is the last committed one.
         clock = Clock(clock.path_time[1:], clock.rate[1:])
         if not len(clock.path_time):
             return None
@@ -279,7 +278,7 @@ def smooth_chunk(
 
 
 def _follow(robot: Robot, raw: Plan, window: slice, clock: Clock, start: float) -> Plan:
-    """Returns ``raw`` as played by ``clock``, from context time ``start``."""
+    """Returns ``raw`` played by ``clock``, from Context time ``start``."""
     s = clock.path_time
     times = raw.path_time[window]
     waypoints = raw.q[window].copy()
@@ -305,7 +304,7 @@ def _follow(robot: Robot, raw: Plan, window: slice, clock: Clock, start: float) 
 def smooth_plan(
     robot: Robot, raw: Plan, limits: PathLimits, chunk: float = 0.96
 ) -> Plan:
-    """Returns the whole of ``raw``, re-timed chunk by chunk as the system does it."""
+    """Returns all of ``raw``, re-timed chunk by chunk as the system does it."""
     progress = Progress(standing_plan(robot, raw.start_time))
     while (extended := smooth_chunk(robot, limits, progress, raw, chunk)) is not None:
         progress = extended

@@ -1,4 +1,4 @@
-"""How well the robot does what the plan says, one number a step."""
+"""The reward for tracking a plan, per step."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,8 @@ from loco_drake.models.robots import Robot
 
 Array = NDArray[np.float64]
 
-# Name, weight, and what is scaled in the exponent: Peng et al. 2020, "Learning agile
-# robotic locomotion skills by imitating animals", Section IV-B.
+# Terms and weights of Peng et al. 2020, "Learning agile robotic locomotion skills by
+# imitating animals", Section IV-B.
 REWARD_TERMS = ("joints", "joint_velocities", "toes", "base_pose", "base_velocity")
 REWARD_WEIGHTS = np.array([0.5, 0.05, 0.2, 0.15, 0.1])
 
@@ -30,9 +30,9 @@ def reward_terms(
     state: Array,
     R_WB: Array | None = None,
 ) -> Array:
-    """Returns the five terms of the reward, weighted, (..., 5); their sum is at most 1.
+    """Returns the five weighted terms of the reward, (..., 5); their sum is at most 1.
 
-    With e the sum of squared errors, in rad, m and s:
+    With e the sum of squared errors in rad, m and s:
 
     - joints: .5 exp(-5 e)
     - joint velocities: .05 exp(-.1 e)
@@ -43,10 +43,10 @@ def reward_terms(
 
     Args:
         robot: the robot.
-        plan_state: what the plan wants, [q, v] as in :class:`Plan`, shape (..., 37).
-        plan_p_BoF_H: the plan's toes, as :attr:`Plan.p_BoF_H`, shape (..., 4, 3).
-        state: the robot's [q, v], its quaternion of length one, shape (..., 37).
-        R_WB: the base's rotation matrix (..., 3, 3), if it is known already.
+        plan_state: [q, v] of the plan, shape (..., 37).
+        plan_p_BoF_H: toes of the plan, as :attr:`Plan.p_BoF_H`, shape (..., 4, 3).
+        state: [q, v] of the robot with a unit quaternion, shape (..., 37).
+        R_WB: the base's rotation matrix (..., 3, 3), if known.
     """
     (q, v), (plan_q, plan_v) = split(state), split(plan_state)
     if R_WB is None:

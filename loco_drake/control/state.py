@@ -1,8 +1,8 @@
-"""A robot's state [q, v]: its parts, its unit quaternion, and whether it has fallen.
+"""The state [q, v] of a robot: its parts, its unit quaternion, and fall detection.
 
-The order is that of the plant: q = [q_WB as w x y z, p_WB, joints], of size 7 + J, and
-v = [w_WB_W, v_WB_W, joint velocities], of size 6 + J. ``q[JOINTS]`` and the like take
-arrays of any leading shape, which Drake's namedview does not.
+The order is the plant's: q = [q_WB as w x y z, p_WB, joints], of size 7 + J, and v =
+[w_WB_W, v_WB_W, joint velocities], of size 6 + J. Unlike Drake's namedview,
+``q[JOINTS]`` and the other indices accept arrays of any leading shape.
 """
 
 import itertools
@@ -28,7 +28,7 @@ JOINT_VELOCITIES = np.s_[..., 6:]
 _ROUNDING = (
     1e-14  # what dividing a quaternion by its length leaves of the square's error
 )
-# Tilted this far from upright, a robot does not come back to its feet.
+# A robot that tilts further does not recover.
 _MAX_TILT = np.deg2rad(60.0)
 _CORNERS = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
 
@@ -40,11 +40,11 @@ def split(state: Array) -> tuple[Array, Array]:
 
 
 def unit_base(state: Array) -> Array:
-    """Returns states, or positions, whose quaternion of the base has length one.
+    """Returns states or positions with unit base quaternions.
 
-    Drake's discrete plants integrate the quaternion and never normalize it: its length
-    grows by a few per cent in ten seconds of a trot. The plant itself does not mind.
-    What is one up to rounding stays as it is, so that doing it twice is doing it once.
+    Drake's discrete plants integrate the quaternion and never normalize it. Its norm
+    grows by a few per cent in ten seconds of a trot. A quaternion that has length one
+    up to rounding is returned unchanged, so the function is idempotent.
 
     Args:
         state: [q, v] or q, shape (..., n).
@@ -60,12 +60,12 @@ def unit_base(state: Array) -> Array:
 
 
 def has_fallen(robot: Robot, q: Array, R_WB: Array | None = None) -> NDArray[np.bool_]:
-    """Returns whether the trunk's box touches the ground or leans over 60 degrees.
+    """Returns whether the trunk touches the ground or tilts by more than 60 degrees.
 
     Args:
         robot: the robot.
-        q: the plant's positions, [R_WB as w x y z, p_WB, joints], shape (..., 19).
-        R_WB: the base's rotation matrix (..., 3, 3), if it is known already.
+        q: positions, [q_WB as w x y z, p_WB, joints], shape (..., 19).
+        R_WB: the base's rotation matrix (..., 3, 3), if known.
 
     Returns:
         One bool for each robot, shape (...).
