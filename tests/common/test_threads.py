@@ -6,12 +6,12 @@ import torch
 from loco_drake.common.determinism import single_thread
 from tests.process import run_python
 
+pytestmark = pytest.mark.slow
+
 # Each prints the threads of torch and of numpy's library.
 SHOW = """
 import numpy as np, torch
 from threadpoolctl import threadpool_info
-
-pytestmark = pytest.mark.slow
 def show(x=None):
     pools = {pool["num_threads"] for pool in threadpool_info()}
     return torch.get_num_threads(), max(pools)
