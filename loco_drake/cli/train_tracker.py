@@ -6,17 +6,11 @@ from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import tyro
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeRemainingColumn,
-)
 
 from loco_drake.cli.output import print_table, write_results
 from loco_drake.cli.training import print_stopped
 from loco_drake.common.errors import InputError, check_at_least
+from loco_drake.common.progress import progress_bar
 from loco_drake.tracking.config import TrainingConfig
 
 if TYPE_CHECKING:
@@ -63,19 +57,12 @@ class TrainTracker(TrainingConfig):
         if self.references is None:
             raise InputError("--references must name a folder of Motion files.")
         plans = load_references(get_robot(environment.robot), self.references)
-        bar = Progress(
-            TextColumn("steps"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeRemainingColumn(),
-            TextColumn("return {task.fields[score]:.1f} of 100"),
-        )
-        with bar:
-            task = bar.add_task("steps", total=self.steps, score=0.0)
+        with progress_bar() as bar:
+            task = bar.add_task("tracker", total=self.steps, note="")
 
             def report(progress: "TrainingProgress") -> None:
-                score = fmean(progress.scores.values())
-                bar.update(task, completed=progress.steps, score=score)
+                note = f"return {fmean(progress.scores.values()):.1f} of 100"
+                bar.update(task, completed=progress.steps, note=note)
 
             figures = train_tracker(
                 plans,

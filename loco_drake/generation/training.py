@@ -9,18 +9,11 @@ from typing import Any
 
 import numpy as np
 import torch
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeRemainingColumn,
-)
 from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 
 from loco_drake.common.determinism import single_thread
+from loco_drake.common.progress import progress_bar
 from loco_drake.common.run_folder import (
     learning_tensors,
     open_run,
@@ -112,7 +105,7 @@ def train(
         last = math.nan
         # The logs overwrite what a lost run logged later.
         writer = SummaryWriter(str(config.out / "logs"), purge_step=step)
-        with _progress() as progress, closing(writer) as logs:
+        with progress_bar() as progress, closing(writer) as logs:
             bar = progress.add_task(name, total=config.steps, completed=step, note="")
             while step < config.steps and not stop_requested.is_set():
                 rate = config.learning_rate * _schedule(step / config.steps)
@@ -139,15 +132,3 @@ def train(
 def _schedule(progress: float) -> float:
     """Returns the learning rate as a share of the highest, ``progress`` in [0, 1)."""
     return min(progress / 0.02 + 0.01, 1.0) * 0.5 * (1 + math.cos(math.pi * progress))
-
-
-def _progress() -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[note]}"),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        refresh_per_second=2,
-    )
