@@ -11,13 +11,18 @@ from rich.progress import (
 
 
 def progress_bar() -> Progress:
-    """Returns a bar whose tasks have a ``note`` that is shown behind the steps."""
+    """Returns a bar whose tasks have a ``note`` that is shown behind the steps.
+
+    In a file or a pipe there is none, so that errors stand alone.
+    """
+    console = Console(stderr=True)
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("{task.fields[note]}"),
         TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=console,
+        disable=not console.is_terminal,
         refresh_per_second=2,
     )
