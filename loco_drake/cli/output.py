@@ -9,7 +9,9 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
+from loco_drake.common.errors import one_line
 from loco_drake.common.files import atomic_path, figures_sha256
 
 
@@ -28,15 +30,23 @@ def write_results(path: Path | None, figures: dict[str, Any]) -> None:
 def print_table(
     title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]
 ) -> None:
-    """Prints a table to stdout; the first column is text, the others are numbers."""
-    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    """Prints a table to stdout; the first column is text, the others are numbers.
+
+    Names of files and gaits may hold anything: they are no markup, and one line.
+    """
+    table = Table(
+        title=Text(one_line(title)),
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+    )
     for index, column in enumerate(columns):
         first = index == 0
         table.add_column(
             column, justify="left" if first else "right", no_wrap=first, overflow="fold"
         )
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*(Text(one_line(cell)) for cell in row))
     # Rich takes a file or a pipe for a terminal of 80 columns.
     Console(width=None if sys.stdout.isatty() else 160).print(table)
 
@@ -73,7 +83,7 @@ def print_failed(failed: Iterable[tuple[str, str]]) -> None:
     """Says on stderr which clips failed, and why."""
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     for name, error in failed:
-        console.print(f"Failed: {name}: {error}", markup=False)
+        console.print(one_line(f"Failed: {name}: {error}"), markup=False)
 
 
 # Behind the name of a row whose figures are outside their bounds.
@@ -91,4 +101,5 @@ def print_warnings(warnings: Mapping[str, Sequence[str]]) -> None:
     print(f"(!) Outside their bounds, see the warnings: {len(warnings)}")
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     for name, sentences in warnings.items():
-        console.print(f"Warning: {name}: {'; '.join(sentences)}", markup=False)
+        text = f"Warning: {name}: {'; '.join(sentences)}"
+        console.print(one_line(text), markup=False)

@@ -33,6 +33,7 @@ def parse_resumed(command: Any, prog: str, args: Sequence[str]) -> Any:
         options_of,
         read_checkpoint,
         settings,
+        sound,
         with_options,
     )
 
@@ -41,7 +42,8 @@ def parse_resumed(command: Any, prog: str, args: Sequence[str]) -> Any:
     check_folder(command.out, CHECKPOINT, resume=True)
     saved = read_checkpoint(command.out / CHECKPOINT, command.NAME)
     own = {k: v for k, v in saved.options.items() if k not in _OF_THE_CALL}
-    default = with_options(command, own)
+    with sound(saved.path):
+        default = with_options(command, own)
     parsed = tyro.cli(type(command), prog=prog, args=args, default=default)
     options = settings(options_of(parsed), *_OF_THE_CALL, *_FOLDERS)
     check_same(saved, options, options, parsed.steps)

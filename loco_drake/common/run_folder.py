@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from pathlib import Path
-from types import FrameType
-from typing import Any, TypeVar
+from types import FrameType, UnionType
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import torch
 from torch import Tensor, nn
@@ -226,11 +226,17 @@ def with_options(config: Config, options: Mapping[str, Any]) -> Config:
     """Returns a copy of a dataclass with values of :func:`options_of`.
 
     What ``options`` lacks stays; what the dataclass lacks is left out.
+
+    Raises:
+        TypeError: if a value is not of the field's type.
     """
     changes = {}
+    hints = get_type_hints(type(config))
     for field in fields(config):  # type: ignore[arg-type]
         if field.name in options:
             old, new = getattr(config, field.name), options[field.name]
+            if not _fits(hints[field.name], new):
+                raise TypeError(field.name)
             if is_dataclass(old):
                 new = with_options(old, new)
             elif isinstance(new, list) and not isinstance(old, list):
@@ -239,6 +245,24 @@ def with_options(config: Config, options: Mapping[str, Any]) -> Config:
                 new = Path(new)
             changes[field.name] = new
     return replace(config, **changes)  # type: ignore[type-var]
+
+
+def _fits(hint: Any, value: Any) -> bool:
+    """Returns whether JSON is what :func:`options_of` makes of a field of that type."""
+    inner = get_args(hint)
+    if get_origin(hint) in (UnionType, Union):
+        return any(_fits(item, value) for item in inner)
+    if get_origin(hint) in (tuple, list):
+        if not isinstance(value, list):
+            return False
+        # Of one type as many as there are, tuple[T, ...] or list[T]; else one of each.
+        many = get_origin(hint) is list or inner[-1] is ...
+        of = inner[:1] * len(value) if many else inner
+        return len(of) == len(value) and all(map(_fits, of, value))
+    if is_dataclass(hint):
+        return isinstance(value, dict)
+    kinds = {float: (float, int), Path: (str,)}
+    return type(value) in kinds.get(hint, (hint,))
 
 
 def learning_tensors(
@@ -263,8 +287,17 @@ def restore_learning(
     with sound(saved.path):
         moments: dict[int, dict[str, Tensor]] = {}
         for key, value in part(saved, "optimizer").items():
-            index, name = key.split("/")
-            moments.setdefault(int(index), {})[name] = value
+            number, name = key.split("/")
+            moments.setdefault(int(number), {})[name] = value
+        # The optimizer itself would take whatever it is given.
+        weights = [w for group in optimizer.param_groups for w in group["params"]]
+        for index, of in moments.items():
+            shapes = {name: value.shape for name, value in of.items()}
+            shape = weights[index].shape
+            if shapes != {"step": (), "exp_avg": shape, "exp_avg_sq": shape} or not all(
+                value.is_floating_point() for value in of.values()
+            ):
+                raise ValueError("not the moments of Adam")
         groups = optimizer.state_dict()["param_groups"]
         optimizer.load_state_dict({"state": moments, "param_groups": groups})
         torch.set_rng_state(saved.tensors["random/torch"])

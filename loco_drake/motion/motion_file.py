@@ -11,7 +11,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.common.errors import InputError, quoted
+from loco_drake.common.errors import InputError, one_line, quoted
 from loco_drake.common.files import atomic_path, content_sha256, parse_json
 from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.motion import UNITS, Motion
@@ -68,7 +68,8 @@ def load_motion(path: Path) -> Motion:
         motion = _make(header, arrays)
         if claimed not in (None, _content_sha256(header, arrays)):
             raise InputError("It is damaged: it was written with other content.")
-        check_conventions(ordered := in_robot_order(motion))
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused
+            check_conventions(ordered := in_robot_order(motion))
     except InputError as error:
         named = str(path) in str(error)
         raise InputError(str(error) if named else f"{path}: {error}") from None
@@ -77,7 +78,8 @@ def load_motion(path: Path) -> Motion:
             f"{path} is not a Motion file: it must be an .npz with a JSON header."
         ) from None
     if ordered is not motion:
-        print(f"{path}: joints {ordered.provenance['joints']}.", file=sys.stderr)
+        text = f"{path}: joints {ordered.provenance['joints']}."
+        print(one_line(text), file=sys.stderr)
     return ordered
 
 
