@@ -114,6 +114,8 @@ def read_legs(
     try:
         Parser(plant).AddModelsFromString(model, "urdf")
         plant.Finalize()
+        # Drake passes over joints that have no links.
+        moving: list[RevoluteJoint] = [plant.GetJointByName(name) for name in names]
     except (RuntimeError, ValueError) as error:
         reason = re.sub(r"<literal-string>\S* error: ", "", str(error))
         reason = " ".join(reason.split())[:300]
@@ -123,7 +125,6 @@ def read_legs(
     check_choice("trunk", trunk, frames)
     for foot in feet:
         check_choice("foot", foot, frames)
-    moving: list[RevoluteJoint] = [plant.GetJointByName(name) for name in names]
     for leg, foot, own in zip(LEGS, feet, joints, strict=True):
         _check_path(plant, leg, foot, own, names)
     context = plant.CreateDefaultContext()

@@ -1,13 +1,13 @@
 """What a training log says of how returns grew."""
 
-import json
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from loco_drake.common.files import atomic_path
+from loco_drake.common.files import atomic_path, parse_json
 
 PROGRESS = "progress.jsonl"
 POINTS = 200
@@ -28,7 +28,7 @@ def learning_curve(log: Path, points: int = POINTS) -> dict[str, Any]:
         for each label its mean normalized return (0-100) in recent episodes of the
         training, None before the label was trained on. All are equally long.
     """
-    lines = [json.loads(line) for line in log.read_text().splitlines()]
+    lines = [line for _, line in _sound_lines(log)]
     seconds, before = [], 0.0
     for earlier, line in zip([None, *lines], lines, strict=False):
         if earlier is not None and line["seconds"] < earlier["seconds"]:
@@ -56,13 +56,18 @@ def trim_log(log: Path, steps: int) -> None:
     """Leaves out of a log what was learned and lost: all later than ``steps``."""
     if not log.exists():
         return
-    kept = []
-    for line in log.read_text(errors="replace").splitlines():
-        with suppress(ValueError, LookupError, TypeError):  # half a line
-            if json.loads(line)["steps"] <= steps:
-                kept.append(line + "\n")
+    kept = [text + "\n" for text, row in _sound_lines(log) if row["steps"] <= steps]
     with atomic_path(log) as temporary:
         temporary.write_text("".join(kept))
+
+
+def _sound_lines(log: Path) -> Iterator[tuple[str, dict[str, float]]]:
+    """Yields each line with its figures; passes over half a line, or a damaged one."""
+    for text in log.read_text(errors="replace").splitlines():
+        with suppress(ValueError, TypeError, OverflowError):
+            row = {name: float(value) for name, value in parse_json(text).items()}
+            if row.keys() >= {"steps", "seconds"}:
+                yield text, row
 
 
 def _rounded(value: float | None) -> float | None:

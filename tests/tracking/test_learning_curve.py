@@ -46,3 +46,15 @@ def test_an_empty_log_has_an_empty_curve(tmp_path):
     (tmp_path / "progress.jsonl").write_text("")
     empty = {"steps": [], "seconds": [], "return": {}}
     assert learning_curve(tmp_path / "progress.jsonl") == empty
+
+
+def test_damaged_lines_are_passed_over(tmp_path):
+    """Half a line, what is no JSON, no object, or holds something but numbers."""
+    path = tmp_path / "progress.jsonl"
+    log = write(path, [(n, float(n), {"return/dog-trot": 1.0}) for n in (1, 2)])
+    sound = learning_curve(log)
+    wrong = ['{"steps": 3, "sec', "[1]", '{"steps": 3}', "\x00", "[" * 100_000]
+    wrong += ['{"steps": 3, "seconds": []}', '{"steps": 3, "seconds": NaN}']
+    wrong += [f'{{"steps": {10**400}, "seconds": 3.0}}']
+    path.write_text("\n".join([wrong[0], *log.read_text().splitlines(), *wrong]))
+    assert learning_curve(log) == sound
