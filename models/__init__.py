@@ -1,1 +1,1 @@
-"""The robots, ready for Drake, and the pretrained weights."""
+"""Robot models for Drake, and the pretrained weights."""

@@ -12,7 +12,7 @@ from .robots import ROBOTS, ConfigureParser, get_robot
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Shows the robot that the arguments name until the user quits.
+    """Shows the robot named in the arguments until the user quits.
 
     Returns:
         The exit status: 0, or 2 if there is no such robot.

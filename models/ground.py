@@ -1,4 +1,4 @@
-"""Flat ground: a half space to stand on and a chequered floor to look at."""
+"""Flat ground: a half space for contact and a chequered floor for display."""
 
 from pydrake.common import MemoryFile
 from pydrake.geometry import (
@@ -16,12 +16,11 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.systems.framework import Context
 
-# So much stiffer than the feet that theirs is the stiffness of the contact:
+# Stiff enough that the feet determine the stiffness of the contact:
 # k = k_foot k_ground / (k_foot + k_ground).
 _STIFFNESS = 1e9
 
-# Of the feet, s/m. That of a contact is the mean of both, weighted by the other's
-# stiffness.
+# Of the feet, s/m. A contact uses the mean of both, weighted by the other's stiffness.
 _FOOT_DISSIPATION = 1.0
 
 _TILE = 0.5  # m; shows at a glance how far and how fast a robot goes
@@ -40,7 +39,7 @@ def AddGround(plant: MultibodyPlant, *, friction: float, visual: bool) -> None:
     Args:
         plant: registered with a scene graph.
         friction: Coulomb coefficient, static and dynamic.
-        visual: whether to draw a floor as well.
+        visual: whether to add a visible floor.
     """
     properties = ProximityProperties()
     AddContactMaterial(
@@ -72,18 +71,18 @@ def SetGround(
     friction: float | None = None,
     stiffness: float | None = None,
 ) -> None:
-    """Changes the ground in a Context; what is None stays as it is.
+    """Sets ground parameters in a Context; None leaves a parameter unchanged.
 
     Args:
-        plant: with a ground of :func:`AddGround`.
-        scene_graph: that the plant is registered with.
+        plant: contains a ground from :func:`AddGround`.
+        scene_graph: the plant's scene graph.
         context: the scene graph's.
         friction: Coulomb coefficient, static and dynamic.
-        stiffness: in N/m; that of a contact is k_foot k / (k_foot + k). Such ground
-            is damped like the feet, so that the damping of a contact stays theirs.
+        stiffness: N/m; a contact has k_foot k / (k_foot + k). The ground's damping is
+            set to the feet's, so that the damping of a contact does not change.
     """
     inspector = scene_graph.get_query_output_port().Eval(context).inspector()
-    # Whoever shares the plant may have put shapes of their own into the world.
+    # Users may have added their own shapes to the world.
     (ground,) = (
         shape
         for shape in plant.GetCollisionGeometriesForBody(plant.world_body())
@@ -105,7 +104,7 @@ def SetGround(
 
 
 def _floor() -> Mesh:
-    """Returns the floor; a mesh in memory, as Drake's shapes have but one colour."""
+    """Returns the floor as a mesh, since other Drake shapes have one colour."""
     side = _TILES + 1
     obj = ["mtllib floor.mtl"]
     corners = [(k - _TILES / 2) * _TILE for k in range(side)]

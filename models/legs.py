@@ -1,4 +1,4 @@
-"""The order of legs and joints, and what mirroring left-right does to them."""
+"""Order of legs and joints, and left-right mirroring."""
 
 import numpy as np
 

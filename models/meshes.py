@@ -1,8 +1,8 @@
-"""The vendors' meshes, converted once to a format that Drake reads.
+"""The manufacturers' meshes, converted once to a format that Drake reads.
 
-Drake reads no Collada. The Go2's and A1's meshes of the PyPI package
-``example-robot-data`` are rewritten as Wavefront .obj with their colours in an .mtl
-beside it, in the user's cache. They are for drawing only.
+Drake does not read Collada. The meshes of Go2 and A1 in the PyPI package
+``example-robot-data`` are converted to Wavefront .obj files with .mtl colours in the
+user's cache. They are used for visualization only.
 """
 
 import warnings
@@ -16,15 +16,15 @@ from pydrake.multibody.parsing import PackageMap
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import atomic_path, cache_dir
 
-# Bumped when the converter changes, so that caches of older versions are redone.
+# Increment when the converter changes, to invalidate older caches.
 _VERSION = 1
 
 _FOLDERS = {"go2": "go2_description/visuals", "a1": "a1_description/meshes"}
 
-_LOADING = Lock()  # warnings' filters belong to the whole process
+_LOADING = Lock()  # warning filters are global
 
-# Vertices closer than this are merged, in m. It leaves the Go2's meshes nearly as they
-# are and shrinks the A1's to two fifths, so that a static replay stays small.
+# Vertices closer than this, in m, are merged. This hardly changes the Go2's meshes and
+# reduces the A1's to two fifths, which keeps replays small.
 _GRAIN = {"go2": 0.0005, "a1": 0.002}
 
 _PACKAGE_XML = """<?xml version="1.0"?>
@@ -39,7 +39,7 @@ _PACKAGE_XML = """<?xml version="1.0"?>
 
 
 def AddMeshPackage(package_map: PackageMap) -> None:
-    """Registers ``loco_drake_meshes``, converting the meshes the first time.
+    """Registers ``loco_drake_meshes``; converts the meshes the first time.
 
     Raises:
         InputError: if the package ``example-robot-data`` is not installed.
@@ -48,11 +48,10 @@ def AddMeshPackage(package_map: PackageMap) -> None:
 
 
 def convert_meshes() -> Path:
-    """Returns the folder of the converted meshes, made if it is not up to date.
+    """Returns the folder of the converted meshes, which is created or updated.
 
-    Every file is written whole or not at all and package.xml, which marks the folder
-    as complete, comes last: processes that convert at the same time do the work twice,
-    to the same end, and none sees half of it.
+    Files are written atomically, and package.xml, which marks the folder as complete,
+    is written last. Concurrent conversions are therefore safe.
 
     Raises:
         InputError: if the package ``example-robot-data`` is not installed.
@@ -92,7 +91,7 @@ def _vendor() -> Distribution:
 
 def _convert(source: Path, target: Path, grain: float) -> None:
     """Writes the Collada file ``source`` as ``target`` (.obj) and an .mtl beside it."""
-    # Importing it takes longer than all the rest; only the first conversion needs it.
+    # A slow import that only the first conversion needs.
     import trimesh
 
     # Pycollada sets the shape of arrays, which numpy 2.5 deprecates (pycollada#162).
@@ -102,10 +101,10 @@ def _convert(source: Path, target: Path, grain: float) -> None:
     obj = [f"mtllib {target.stem}.mtl"]
     mtl = []
     count = 0
-    # In the scene's frame: parts of a Collada file have transforms of their own.
+    # Parts of a Collada file have transforms; use the scene's frame.
     for index, part in enumerate(scene.dump()):
         assert isinstance(part, trimesh.Trimesh)
-        # Without normals viewers shade each face flat, which suits machined parts and
+        # Without normals, viewers use flat shading, which suits machined parts and
         # halves the file.
         mesh = trimesh.Trimesh(part.vertices / grain, part.faces, process=False)
         mesh.merge_vertices(digits_vertex=0)

@@ -1,4 +1,4 @@
-"""Physical parameters of a robot, set in a Context of its plant, and their bounds."""
+"""Physical parameters of a robot in the Context of its plant, and their bounds."""
 
 from functools import lru_cache
 from math import ceil
@@ -17,7 +17,7 @@ from .robots import Robot, get_robot
 
 Array = NDArray[np.float64]
 
-LEAST_PAYLOAD = -3.0  # kg; what bounds hold for
+LEAST_PAYLOAD = -3.0  # kg; bounds hold down to this payload
 
 _POSES, _REFINED = 1000, 4
 
@@ -29,16 +29,16 @@ def SetTrunkLoad(
     mass: float,
     p_shift_B: Array,
 ) -> None:
-    """Makes the trunk heavier and moves its centre of mass, both against the model.
+    """Sets mass and centre of mass of the trunk relative to the model.
 
-    The rotational inertia about the centre of mass grows in proportion to the mass, as
-    if the trunk were denser.
+    The rotational inertia about the centre of mass scales with the mass, as for a
+    denser trunk.
 
     Args:
-        trunk: of a robot of :func:`.robots.AddRobotModel`.
-        context: its plant's.
-        mass: added, kg; negative ones make the trunk lighter.
-        p_shift_B: of the centre of mass, in B, m, shape (3,).
+        trunk: of a robot from :func:`.robots.AddRobotModel`.
+        context: the plant's.
+        mass: added mass, kg; may be negative.
+        p_shift_B: shift of the centre of mass in B, m, shape (3,).
     """
     M_BBo = trunk.default_spatial_inertia()
     own = M_BBo.get_mass()
@@ -60,14 +60,13 @@ def SetReflectedInertia(
     context: Context,
     inertia: Array,
 ) -> None:
-    """Sets the inertia of the rotors as seen at the joints.
+    """Sets the inertia of the rotors at the joints.
 
     Args:
-        plant: with a robot of :func:`.robots.AddRobotModel`.
+        plant: contains a robot from :func:`.robots.AddRobotModel`.
         instance: the robot's.
         context: the plant's.
-        inertia: by actuator, kg m^2, shape (12,); may be below 0, where links make up
-            for it.
+        inertia: by actuator, kg m^2, shape (12,); may be negative within bounds.
 
     Raises:
         InputError: if the mass matrix would not be positive definite in every pose.
@@ -89,12 +88,13 @@ def SetReflectedInertia(
 
 @lru_cache
 def removable_inertia(robot: Robot) -> float:
-    """Returns how much inertia may be taken off all joints at once, kg m^2.
+    """Returns how much inertia all joints can lose at once, kg m^2.
 
-    The mass matrix M stays positive definite in every pose within the joints' limits:
-    M - c S S', where S picks the joints' columns, is so while c is below the smallest
-    eigenvalue of (S' M^-1 S)^-1. The least of these is searched for from many poses,
-    the trunk lightened by :data:`LEAST_PAYLOAD`, and rounded down to 1e-4.
+    The mass matrix M remains positive definite in every pose within the joint limits: M
+    - c S S', where S selects the joints' columns, is positive definite while c is below
+    the smallest eigenvalue of (S' M^-1 S)^-1. The minimum over poses is searched from
+    many starts, with the trunk lightened by :data:`LEAST_PAYLOAD`, and rounded down to
+    1e-4.
     """
     from scipy.optimize import minimize
 
@@ -123,7 +123,7 @@ def removable_inertia(robot: Robot) -> float:
 
 
 def surplus_inertia(robot: Robot, plant: PlantConfig) -> Array:
-    """Returns the inertia that the implicit PD of a motor at no strength has, (12,).
+    """Returns the apparent inertia of the implicit PD at zero motor strength, (12,).
 
     In kg m^2; see :class:`loco_drake.systems.domain.Actuation`.
     """
@@ -132,10 +132,10 @@ def surplus_inertia(robot: Robot, plant: PlantConfig) -> Array:
 
 
 def least_strength(robot: Robot, plant: PlantConfig) -> float:
-    """Returns the least strength that motors may have, over that of their model.
+    """Returns the smallest valid motor strength, relative to the model.
 
-    A motor of strength s has (1 - s) times :func:`surplus_inertia` less inertia, and
-    of that no more than :func:`removable_inertia` may go. Rounded up to 1 %.
+    A motor of strength s loses (1 - s) times :func:`surplus_inertia`, which may not
+    exceed :func:`removable_inertia`. Rounded up to 1 %.
     """
     surplus = float(surplus_inertia(robot, plant).max())
     if surplus == 0:

@@ -1,4 +1,4 @@
-"""A robot on flat ground as a MultibodyPlant, ready to be driven."""
+"""A robot on flat ground as a MultibodyPlant."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -59,39 +59,39 @@ def AddRobotPlant(
 ) -> tuple[MultibodyPlant, SceneGraph, ModelInstanceIndex]:
     """Adds a finalized plant with ``robot`` and a ground, and a scene graph.
 
-    The systems are named "plant" and "scene_graph". The robot stands by default: trunk
+    The systems are named "plant" and "scene_graph". By default the robot stands: trunk
     at (0, 0, robot.stand_height), joints at robot.stand_joints. Its PD runs inside the
-    plant, on the port ``plant.get_desired_state_input_port(instance)``, [q_d; v_d] of
-    the 12 joints; as long as that port is not connected the joints are limp. v_d must
-    be 0 (CENIC of Drake 1.51 takes it with the wrong sign).
+    plant; the port ``plant.get_desired_state_input_port(instance)`` takes [q_d; v_d] of
+    the 12 joints, in rad and rad/s. The joints are limp while it is not connected. v_d
+    must be 0, since CENIC of Drake 1.51 applies it with the wrong sign.
 
     Args:
-        builder: of the diagram that the systems are for.
+        builder: the builder.
         robot: from :func:`loco_drake.models.robots.get_robot`.
-        config: contact, step and friction. With "cenic" the caller must also call
+        config: contact, time step and friction. With "cenic" also call
             :func:`ConfigureSimulator`.
-        pre_finalize: adds whatever else there is to be in the plant.
+        pre_finalize: called before finalization; may add to the plant.
 
     Returns:
         The plant, the scene graph and the robot's model instance.
 
     Raises:
-        InputError: if ``config`` is not sound.
+        InputError: if ``config`` is invalid.
     """
     config.check()
     continuous = config.contact == "cenic"
     plant_config = MultibodyPlantConfig(
         time_step=0.0 if continuous else config.time_step,
         contact_model="point",
-        # With sampled ports the plant steps by an unrestricted update, which would see
-        # targets that are set in the same step only one step later.
+        # With sampled ports the plant steps in an unrestricted update, which sees
+        # targets set at the same time one step late.
         use_sampled_output_ports=False,
     )
     if not continuous:
         plant_config.discrete_contact_approximation = config.contact
     plant, scene_graph = AddMultibodyPlant(plant_config, builder)
-    # By default Drake prepares every shape for hydroelastic and deformable contact too,
-    # and warns that it cannot with a half space.
+    # By default Drake prepares every shape for hydroelastic and deformable contact, and
+    # warns that it cannot for a half space.
     scene_graph_config = SceneGraphConfig()
     scene_graph_config.default_proximity_properties.resolution_hint = None
     scene_graph.set_config(scene_graph_config)
@@ -108,10 +108,11 @@ def AddRobotPlant(
 
 
 def ConfigureSimulator(simulator: Simulator, config: PlantConfig) -> None:
-    """Sets up the integrator that ``config`` asks for.
+    """Sets the integrator that ``config`` requires.
 
-    Discrete plants need none; for "cenic" this installs Drake's CENIC integrator with
-    error control at ``config.accuracy`` and at most ``config.time_step`` a step.
+    For "cenic" this is Drake's CENIC integrator with error control at
+    ``config.accuracy`` and steps of at most ``config.time_step``. Discrete plants need
+    none.
     """
     if config.contact == "cenic":
         simulator_config = SimulatorConfig(

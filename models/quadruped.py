@@ -1,4 +1,4 @@
-"""What retargeting and the figures of motion ask of a robot, whatever its legs."""
+"""The interface of a robot to retargeting and metrics, for any leg design."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -20,15 +20,15 @@ class Quadruped(ABC):
     left, z up. Methods take and return arrays with any leading shape.
 
     Attributes:
-        name: as in the header of a Motion file.
-        definition: what :func:`loco_drake.models.robot_files.load_robot` makes it from.
+        name: name in Motion files.
+        definition: argument of :func:`loco_drake.models.robot_files.load_robot`.
         joint_names: names of the J joints.
         joint_lower: lower position limits in rad, shape (J,).
         joint_upper: upper position limits in rad, shape (J,).
         joint_speed_limits: rad/s, shape (J,).
         p_BHip: origins of the legs' first joints in m, shape (4, 3).
-        foot_radius: of the toe sphere, m.
-        stand_joints: joints of the usual stance in rad, shape (J,).
+        foot_radius: radius of the toe spheres, m.
+        stand_joints: joints of the standing pose in rad, shape (J,).
         stand_height: z of p_WB in m with the trunk level, the joints at
             ``stand_joints`` and the lowest points of the toe spheres at z = 0.
         trunk_frame: name of B in the model.
@@ -56,16 +56,16 @@ class Quadruped(ABC):
     @property
     @abstractmethod
     def p_BV(self) -> Array:
-        """Virtual hips in m, shape (4, 3): a toe right below one is where it stands."""
+        """Virtual hips in m, shape (4, 3): the points below which the toes stand."""
 
     @property
     @abstractmethod
     def folded_length(self) -> float:
-        """How near in m a toe can be to the joint that swings its leg fore and aft."""
+        """Shortest distance of a toe from the joint that swings its leg fore-aft, m."""
 
     @abstractmethod
     def AddModel(self, parser: Parser) -> ModelInstanceIndex:
-        """Adds the model, without pictures, to the parser's plant."""
+        """Adds the model, without visual geometry, to the parser's plant."""
 
     @abstractmethod
     def toe_positions(self, joints: Array) -> Array:
@@ -85,4 +85,4 @@ class Quadruped(ABC):
 
     @abstractmethod
     def reachable_toes(self, p_BF: Array) -> Array:
-        """Returns where the toes can be, within the limits, near ``p_BF``."""
+        """Returns toe positions within the limits near ``p_BF``, shape (..., 4, 3)."""

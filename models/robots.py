@@ -1,4 +1,4 @@
-"""The robots: what their models say, as numbers."""
+"""Go2 and A1: their models as numbers."""
 
 import re
 from dataclasses import dataclass
@@ -30,24 +30,24 @@ _MODELS = Path(__file__).parent
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Robot(Quadruped):
-    """A quadruped with three joints a leg, all read from its Drake model.
+    """A quadruped with three joints per leg, all read from its Drake model.
 
-    Every leg is a hip (about x, abduction), a thigh and a calf (both about y), in this
-    order. With the hip joint at p_BHip, the thigh joint ``d`` to its side, links of
-    length ``l1`` and ``l2`` that hang down at zero, and angles a, b, c,
+    Every leg has a hip (about x, abduction), a thigh and a calf (both about y), in this
+    order. With the hip joint at p_BHip, the thigh joint at an offset ``d`` to its side,
+    links of length ``l1`` and ``l2`` that hang down at zero, and angles a, b, c,
 
         p_BF = p_BHip + Rx(a) [-l1 sin b - l2 sin(b + c), d, -l1 cos b - l2 cos(b + c)]
 
-    from which kinematics follow in closed form.
+    from which the kinematics follow in closed form.
 
     Attributes:
         url: the model, ``package://...``; see :func:`ConfigureParser`.
-        effort_limits: Nm at the joint, shape (12,).
-        reflected_inertia: of the rotors as seen at the joint, kg m^2, shape (12,).
-        joint_inertia: about each joint with the others locked, in the usual stance,
-            reflected inertia included, kg m^2, shape (12,).
-        kp: stiffness of the PD in the plant, Nm/rad, shape (12,).
-        kd: damping of the PD in the plant, Nm s/rad, shape (12,).
+        effort_limits: at the joint, N m, shape (12,).
+        reflected_inertia: of the rotors at the joint, kg m^2, shape (12,).
+        joint_inertia: about each joint with the others locked in the standing pose,
+            including reflected inertia, kg m^2, shape (12,).
+        kp: stiffness of the PD in the plant, N m/rad, shape (12,).
+        kd: damping of the PD in the plant, N m s/rad, shape (12,).
         mass: of the whole robot, kg.
         abduction_offset: y in m from the hip joint's axis to the thigh joint, positive
             on the left, shape (4,).
@@ -70,12 +70,12 @@ class Robot(Quadruped):
 
     @property
     def p_BV(self) -> Array:
-        """The thigh joints at zero abduction."""
+        """The thigh joints at zero abduction, m, shape (4, 3)."""
         return self.p_BHip + self.abduction_offset[:, None] * np.array([0.0, 1.0, 0.0])
 
     @property
     def folded_length(self) -> float:
-        """From the thigh joint, the calf at its limit."""
+        """Distance of the toe from the thigh joint with the calf at its limit, m."""
         l1, l2 = self.thigh_length, self.calf_length
         square = l1**2 + l2**2 + 2 * l1 * l2 * np.cos(self.joint_lower[2])
         return float(np.sqrt(square))
@@ -116,11 +116,10 @@ class Robot(Quadruped):
     def leg_joints(self, p_BF: Array) -> Array:
         """Returns joints (..., 12) in rad that put the toes at ``p_BF`` (..., 4, 3).
 
-        Of the solutions, this is the one with the foot below the hip's axis, in the
-        plane of the leg, and the knee bent backward (calf negative), as these robots
-        are built. A target that the calf's limits do not let the toe reach is clamped:
-        the leg then points at it, as long (or short) as it can be. Hip and thigh are
-        not clamped, but within (-pi, pi].
+        Selects the solution with the foot below the hip's axis in the plane of the leg
+        and the knee bent backward (calf negative), as these robots are built. A target
+        out of the calf's range is clamped: the leg points at it with its largest or
+        smallest length. Hip and thigh are not clamped, but within (-pi, pi].
         """
         x, y, z = np.moveaxis(p_BF - self.p_BHip, -1, 0)
         d, l1, l2 = self.abduction_offset, self.thigh_length, self.calf_length
@@ -135,14 +134,14 @@ class Robot(Quadruped):
         return joints.reshape(*joints.shape[:-2], 12)
 
     def nearest_joints(self, p_BF: Array) -> Array:
-        """Returns :meth:`leg_joints`, clipped to the joints' limits."""
+        """Returns :meth:`leg_joints` clipped to the joint limits."""
         return np.clip(self.leg_joints(p_BF), self.joint_lower, self.joint_upper)
 
     def reachable_toes(self, p_BF: Array) -> Array:
-        """Returns where the joints' limits let the toes be, near ``p_BF``.
+        """Returns toe positions within the joint limits near ``p_BF``.
 
-        A toe nearer to its hip than the leg folds is moved down the trunk's z axis. A
-        leg that is too short points at its target.
+        A toe that is nearer to its hip than the leg folds is moved down the trunk's z
+        axis. A leg that is too short points at its target.
         """
         x, y, z = np.moveaxis(p_BF - self.p_BHip, -1, 0)
         # In the plane of the leg, whose distance from the hip's axis is the offset.
@@ -155,7 +154,7 @@ class Robot(Quadruped):
         return self.toe_positions(self.nearest_joints(goal))
 
     def _ends(self, joints: Array, calf_length: float) -> Array:
-        """Returns the points (..., 4, 3) in B that far below the calf joints."""
+        """Returns points (..., 4, 3) in B at this distance below the calf joints."""
         a, b, c = _angles(joints)
         x = -self.thigh_length * np.sin(b) - calf_length * np.sin(b + c)
         z = -self.thigh_length * np.cos(b) - calf_length * np.cos(b + c)
@@ -170,12 +169,12 @@ class Robot(Quadruped):
 
 
 def ConfigureParser(parser: Parser, *, visual: bool = True) -> None:
-    """Makes known to ``parser`` the packages that the models' URLs name.
+    """Registers the packages in the models' URLs with ``parser``.
 
     Args:
-        parser: that is to load the models.
-        visual: whether to register the meshes too; the first time that takes some
-            seconds, see :mod:`loco_drake.models.meshes`.
+        parser: the parser.
+        visual: whether to register the meshes; the first time this takes some seconds,
+            see :mod:`loco_drake.models.meshes`.
     """
     parser.package_map().AddPackageXml(str(_MODELS / "package.xml"))
     if visual:
@@ -186,10 +185,9 @@ def AddRobotModel(parser: Parser, name: str, *, visual: bool) -> ModelInstanceIn
     """Adds a robot to the parser's plant.
 
     Args:
-        parser: of a plant that is not finalized.
+        parser: parser of a plant that is not finalized.
         name: one of :data:`ROBOTS`.
-        visual: whether to load the meshes. Without them the model is parsed five
-            times faster and nothing is converted or drawn.
+        visual: whether to load meshes. Without them parsing is five times as fast.
 
     Raises:
         InputError: if there is no such robot.
@@ -207,7 +205,7 @@ def AddRobotModel(parser: Parser, name: str, *, visual: bool) -> ModelInstanceIn
 
 @lru_cache
 def get_robot(name: str) -> Robot:
-    """Returns the robot called ``name``; the model is parsed once.
+    """Returns the robot ``name``; its model is parsed once.
 
     Raises:
         InputError: if there is no such robot.
@@ -217,7 +215,7 @@ def get_robot(name: str) -> Robot:
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.01)
     AddRobotModel(Parser(plant), name, visual=False)
     plant.Finalize()
-    # What the URDF does not say: the usual stance, in rad, legs FL, FR, RL, RR.
+    # The URDF lacks the standing pose: rad, legs FL, FR, RL, RR.
     extras = yaml_load(filename=str(_MODELS / name / f"{name}.yaml"))
     names = tuple(f"{leg}_{part}_joint" for leg in LEGS for part in LEG_JOINTS)
     joints = [plant.GetJointByName(joint) for joint in names]
@@ -272,14 +270,14 @@ def _url(name: str) -> str:
 
 
 def _origins(plant: MultibodyPlant, context: Context, part: str) -> Array:
-    """Returns the origins of the four legs' frames of that name in B, shape (4, 3)."""
+    """Returns the origins in B of the four legs' frames ``part``, m, shape (4, 3)."""
     base = plant.GetFrameByName("base")
     frames = [plant.GetFrameByName(f"{leg}_{part}") for leg in LEGS]
     return np.array([frame.CalcPose(context, base).translation() for frame in frames])
 
 
 def _foot_radius(plant: MultibodyPlant, scene_graph: SceneGraph) -> float:
-    """Returns the radius of the toe spheres, which must be alike."""
+    """Returns the radius of the toe spheres, which must be equal."""
     inspector = scene_graph.model_inspector()
     radii = set()
     for leg in LEGS:
@@ -293,7 +291,7 @@ def _foot_radius(plant: MultibodyPlant, scene_graph: SceneGraph) -> float:
 
 
 def _trunk_size(plant: MultibodyPlant, scene_graph: SceneGraph) -> Array:
-    """Returns the size of the one box on the trunk, which must be centred at B."""
+    """Returns the size of the only box on the trunk, which must be centred at B."""
     inspector = scene_graph.model_inspector()
     body = plant.GetBodyByName("base")
     (geometry,) = plant.GetCollisionGeometriesForBody(body)

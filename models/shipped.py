@@ -1,4 +1,4 @@
-"""The weights that come with the package."""
+"""The shipped weights."""
 
 from importlib import resources
 from pathlib import Path
@@ -14,27 +14,27 @@ def pretrained_dir() -> Path:
 
 
 def pretrained_path(name: str) -> Path:
-    """Returns where the shipped weights called ``name`` are, such as "tokenizer"."""
+    """Returns the path of the shipped weights ``name``, such as "tokenizer"."""
     return pretrained_dir() / f"{name}.safetensors"
 
 
 def policy_variants(robot: Robot) -> dict[str, Path]:
-    """Returns by name the shipped policies of ``robot`` other than its main one."""
+    """Returns the shipped policies of ``robot`` except the main one, by name."""
     prefix = f"policy_{robot.name}_"
     files = sorted(pretrained_dir().glob(f"{prefix}*.safetensors"))
     return {file.stem.removeprefix(prefix): file for file in files}
 
 
 def policy_path(robot: Robot, policy: Path | None = None) -> Path:
-    """Returns the file of a policy's weights.
+    """Returns the weights file of a policy.
 
     Args:
-        robot: that it moves.
-        policy: a file of weights, which is returned as it is, or the bare name of a
-            shipped variant, such as "randomized"; the shipped policy if not given.
+        robot: the robot.
+        policy: a weights file, which is returned as it is, or the name of a shipped
+            variant, such as "randomized"; the robot's main policy if None.
 
     Raises:
-        InputError: if there is no such policy, naming those that there are.
+        InputError: if there is no such policy; names the existing ones.
     """
     if policy is None:
         return _main(robot)

@@ -1,7 +1,7 @@
-"""The same numbers each time: one thread, and dice named by what they are for.
+"""Reproducible results: single-threaded computation and keyed random numbers.
 
-The networks are small, and a second thread gains nothing: it only spins where another
-program has its core, and takes sums in another order.
+The networks are small. A second thread gains nothing, waits for busy cores and changes
+the order of sums.
 """
 
 import os
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 
 def use_one_thread() -> None:
-    """Makes this process, and those that it starts, compute on one thread for good.
+    """Makes this process and its children use one thread permanently.
 
-    It is called where a process is the library's own: commands and workers.
+    Only for processes that belong to the library: commands and workers.
     """
     from threadpoolctl import threadpool_limits
 
@@ -29,7 +29,7 @@ def use_one_thread() -> None:
 
 @contextmanager
 def single_thread() -> Iterator[None]:
-    """Runs torch on one thread, in a process that may be a user's own."""
+    """Runs torch on one thread within the block, for processes of the user."""
     import torch
 
     threads = torch.get_num_threads()
@@ -41,5 +41,5 @@ def single_thread() -> Iterator[None]:
 
 
 def uniforms(seed: int, index: int, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Returns numbers in [0, 1) that depend on nothing but the arguments."""
+    """Returns random numbers in [0, 1) that depend only on the arguments."""
     return np.random.Generator(np.random.Philox(key=[seed, index])).random(shape)

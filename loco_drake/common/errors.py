@@ -1,4 +1,4 @@
-"""The error that a user can cause and mend."""
+"""Errors in user input, and checks that raise them."""
 
 import re
 from collections.abc import Iterable
@@ -6,15 +6,15 @@ from math import inf, isfinite
 from numbers import Real
 from typing import Any
 
-_LONGEST_WORD = 300  # a path may be as long; what is longer is no word
+_LONGEST_WORD = 300  # such as a long path
 _LONGEST_NAME = 64
 
 
 class InputError(ValueError):
-    """Bad input: the message is one sentence that names the valid choices.
+    """Invalid input; the message is one sentence that names the valid choices.
 
-    The command line prints it without a traceback and exits with status 2. Whatever
-    the message quotes, it is one line of printable text: see :func:`one_line`.
+    The command line prints it without a traceback and exits with status 2. The message
+    is always one line of printable text, see :func:`one_line`.
     """
 
     def __init__(self, message: str) -> None:
@@ -22,7 +22,7 @@ class InputError(ValueError):
 
 
 def one_line(text: str) -> str:
-    """Returns ``text`` with control characters escaped and endless words shortened."""
+    """Returns ``text`` with control characters escaped and very long words cut."""
     line = "".join(
         c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
     )
@@ -31,9 +31,9 @@ def one_line(text: str) -> str:
 
 
 def quoted(value: object) -> str:
-    """Returns what a user wrote, as messages quote it: escaped, at most 64 letters.
+    """Returns user input as messages quote it: escaped, at most 64 characters.
 
-    For everything that comes from a file or the command line and is not a path.
+    Use it for everything from a file or the command line except paths.
     """
     text = str(value)
     cut = text if len(text) <= _LONGEST_NAME else f"{text[: _LONGEST_NAME - 3]}..."
@@ -41,7 +41,7 @@ def quoted(value: object) -> str:
 
 
 def check_name(what: str, value: str) -> str:
-    """Returns ``value`` if it can name something in files, messages and file names.
+    """Returns ``value`` if it is valid as a name in files, messages and file names.
 
     Raises:
         InputError: unless it has 1 to 64 printable characters, and no "/".
@@ -58,7 +58,7 @@ def check_choice(what: str, value: str, choices: Iterable[str]) -> str:
     """Returns ``value`` if it is one of ``choices``.
 
     Raises:
-        InputError: naming ``what`` was wrong and every valid choice.
+        InputError: naming ``what`` and every valid choice.
     """
     choices = list(choices)
     if value not in choices:
@@ -79,10 +79,10 @@ def check_number(what: str, value: Any, low: float, high: float = inf) -> None:
     """Raises InputError unless ``value`` is a finite number from ``low`` to ``high``.
 
     Args:
-        what: its name, which begins the sentence.
-        value: what was given.
-        low: the least that is allowed.
-        high: the most; infinity for no bound.
+        what: name of the value, which begins the sentence.
+        value: the value.
+        low: smallest valid value.
+        high: largest valid value; infinity for no bound.
     """
     number = isinstance(value, Real) and not isinstance(value, bool)
     if not (number and isfinite(value) and low <= value <= high):

@@ -1,4 +1,4 @@
-"""Files that are either whole or not there, and what is read from them."""
+"""Atomic writes, checked JSON and content hashes."""
 
 import hashlib
 import json
@@ -16,7 +16,7 @@ import platformdirs
 
 from loco_drake.common.errors import InputError
 
-# Figures that depend on the machine and what else it does, and the hash itself.
+# Figures that depend on the machine or its load, and the hash itself.
 TIMES = ("real_time_factor", "frames_per_second", "wall_clock_s", "seconds", "sha256")
 _MAX_JSON_BYTES = 64 * 2**20
 
@@ -25,11 +25,11 @@ _MAX_JSON_BYTES = 64 * 2**20
 def atomic_path(path: Path) -> Iterator[Path]:
     """Yields a temporary path that replaces ``path`` if the block succeeds.
 
-    The temporary file lies in the same folder, so that the final rename is atomic;
-    it keeps the suffix of ``path``, which some writers insist on. The folder is made
-    if need be. On any exception the temporary file is removed and ``path`` is left
-    as it was. A link is followed; a device or a pipe, such as /dev/stdout, is not
-    replaced but written to.
+    The temporary file is in the same folder, so the final rename is atomic, and has the
+    suffix of ``path``, which some writers require. The folder is created if necessary.
+    On an exception the temporary file is removed and ``path`` is unchanged. Links are
+    followed. Devices and pipes, such as /dev/stdout, are written to rather than
+    replaced.
 
     Raises:
         InputError: if ``path`` is a folder.
@@ -49,7 +49,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
     try:
         yield temporary
         if direct:
-            # What is the process's own output goes where that has got to.
+            # The process's own output continues at its current position.
             end = target if standard is None else os.dup(standard)
             with temporary.open("rb") as source, open(end, "wb") as sink:
                 shutil.copyfileobj(source, sink)
@@ -64,16 +64,15 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 
 def check_writable(path: Path | None, *, folder: bool = False) -> None:
-    """Finds out, before work is done, whether its result can be written.
+    """Checks before any work whether its result can be written.
 
     Args:
-        path: where to; None is nowhere.
-        folder: whether files are to be written into it, not it itself.
+        path: the path; None to skip the check.
+        folder: whether ``path`` is a folder for files rather than a file.
 
     Raises:
         InputError: if a file is a folder.
-        OSError: if what there is may not be written to, or a folder that is needed is
-            a file.
+        OSError: if an existing path is not writable, or a parent folder is a file.
     """
     if path is None:
         return
@@ -94,20 +93,20 @@ def check_writable(path: Path | None, *, folder: bool = False) -> None:
 
 
 def _status(path: Path) -> os.stat_result | None:
-    """Returns what there is at ``path``, links followed; None if nothing."""
+    """Returns the status of ``path``, links followed; None if it does not exist."""
     try:
         status = os.stat(path)
     except FileNotFoundError:
         return None
     except NotADirectoryError:
-        return None  # said better where the folder is made
+        return None  # atomic_path gives a better message
     if stat.S_ISDIR(status.st_mode):
         raise InputError(f"{str(path)!r} is a folder, not a file to be written.")
     return status
 
 
 def _standard_stream(status: os.stat_result | None) -> int | None:
-    """Returns 1 or 2 if the file is where stdout or stderr goes."""
+    """Returns 1 or 2 if the file is stdout or stderr, else None."""
     for stream in (1, 2):
         try:
             if status is not None and os.path.samestat(status, os.fstat(stream)):
@@ -118,11 +117,11 @@ def _standard_stream(status: os.stat_result | None) -> int | None:
 
 
 def parse_json(text: str | bytes) -> dict[str, Any]:
-    """Returns the object that ``text`` holds.
+    """Returns the JSON object in ``text``.
 
     Raises:
-        ValueError: if it is no JSON, or no object, or holds NaN, infinity, text that
-            is not Unicode, or is nested too deeply.
+        ValueError: if it is not a JSON object, contains NaN, infinity or invalid
+            Unicode, or is nested too deeply.
     """
 
     def finite(number: str) -> float:
@@ -142,11 +141,11 @@ def parse_json(text: str | bytes) -> dict[str, Any]:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Returns the JSON object in a file, such as the figures that a command wrote.
+    """Returns the JSON object in a file, such as the figures of a command.
 
     Raises:
-        InputError: if there is no such file, it cannot be read, is larger than 64 MB,
-            or holds anything that :func:`parse_json` refuses.
+        InputError: if the file does not exist, cannot be read, is larger than 64 MB, or
+            is refused by :func:`parse_json`.
     """
     path = Path(path)
     if not path.is_file():
@@ -161,11 +160,11 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def content_sha256(header: Mapping[str, Any], parts: Mapping[str, bytes]) -> str:
-    """Returns the hash of a file's content, however it is packed.
+    """Returns the hash of a file's content, independent of its compression.
 
     Args:
-        header: must be JSON; as it is written, and read back.
-        parts: by a text that says name, type and shape.
+        header: JSON, as it is written and read back.
+        parts: content by a key that states name, type and shape.
     """
     digest = hashlib.sha256(json.dumps(header).encode())
     for name, data in sorted(parts.items()):
@@ -175,9 +174,9 @@ def content_sha256(header: Mapping[str, Any], parts: Mapping[str, bytes]) -> str
 
 
 def figures_sha256(figures: Any) -> str:
-    """Returns the hash of what a command measured, but for TIMES.
+    """Returns the hash of the figures of a command, excluding TIMES.
 
-    Two runs with one seed have the same.
+    Two runs with the same seed have the same hash.
     """
 
     def lasting(value: Any) -> Any:
@@ -189,7 +188,7 @@ def figures_sha256(figures: Any) -> str:
 
 
 def cache_dir() -> Path:
-    """Returns the user's cache folder, or ``LOCO_DRAKE_CACHE`` where that is set."""
+    """Returns the cache folder: ``LOCO_DRAKE_CACHE`` if set, else the user's."""
     override = os.environ.get("LOCO_DRAKE_CACHE")
     return (
         Path(override) if override else Path(platformdirs.user_cache_dir("loco_drake"))

@@ -1,4 +1,4 @@
-"""The same work on many items, in worker processes."""
+"""Parallel map in worker processes."""
 
 import multiprocessing
 import signal
@@ -13,7 +13,7 @@ from loco_drake.common.errors import check_at_least
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-# What each worker process made for itself.
+# The function of this worker process.
 _function: Callable[[Any], Any]
 
 
@@ -22,16 +22,16 @@ def map_in_workers(
     items: Iterable[Item],
     workers: int,
 ) -> Iterator[Result]:
-    """Yields the result for each item, in the order of the items.
+    """Yields the result for each item, in order.
 
-    Each worker makes its function once and then works on one item after the other;
-    with one worker that is this process. Closing the iterator, or an exception such as
-    Ctrl-C, waits for the items under way and drops the others.
+    Each worker creates its function once and processes one item at a time. With one
+    worker, that is this process. Closing the iterator, or an exception such as Ctrl-C,
+    waits for items in progress and drops the others.
 
     Args:
         make: returns the function; it, the items and the results must be picklable.
-        items: what to work on.
-        workers: processes, at least 1.
+        items: the items.
+        workers: number of processes, at least 1.
 
     Raises:
         InputError: if ``workers`` is below 1.
@@ -67,7 +67,7 @@ def _map(
 
 
 def _start(make: Callable[[], Callable[[Any], Any]]) -> None:
-    # Ctrl-C reaches the whole group of processes; the main one decides.
+    # Ctrl-C reaches the whole process group; only the main process handles it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     use_one_thread()
     global _function

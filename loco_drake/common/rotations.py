@@ -1,7 +1,6 @@
-"""Vectorised rotations in numpy; quaternions are (w, x, y, z), as in Drake.
+"""Vectorized rotations in NumPy; quaternions are (w, x, y, z), as in Drake.
 
-All take arrays with any leading shape: training turns a dozen quaternions for each
-robot and step, for many robots at once. The tests hold these functions against scipy.
+All functions accept arrays of any leading shape. The tests compare them with SciPy.
 """
 
 import numpy as np
@@ -64,9 +63,9 @@ def quat_to_matrix(q: Array) -> Array:
 
 
 def heading_matrix(R_WB: Array) -> Array:
-    """Returns R_WH (..., 3, 3): W turned about z so that x points along the body's.
+    """Returns R_WH (..., 3, 3), where H has the body's heading and z up.
 
-    Row vectors times R_WH are vectors expressed in H.
+    Row vectors in W times R_WH are the same vectors expressed in H.
     """
     x, y = R_WB[..., 0, 0], R_WB[..., 1, 0]
     length = np.hypot(x, y)
@@ -81,7 +80,7 @@ def heading_matrix(R_WB: Array) -> Array:
 
 
 def quat_log(q: Array) -> Array:
-    """Returns rotation vectors (..., 3) in so(3), of length at most pi."""
+    """Returns rotation vectors (..., 3) in so(3), with a norm of at most pi."""
     q = np.where(q[..., :1] < 0, -q, q)
     xyz = q[..., 1:]
     norm = np.sqrt((xyz * xyz).sum(axis=-1, keepdims=True))
@@ -106,7 +105,7 @@ def quat_error(q_WA: Array, q_WB: Array) -> Array:
 
 
 def yaw_of(q: Array) -> Array:
-    """Returns the heading in rad, shape (...): direction of the body's x axis."""
+    """Returns the heading of the body's x axis in rad, shape (...)."""
     w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
     return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
@@ -119,7 +118,7 @@ def yaw_quat(yaw: Array) -> Array:
 
 
 def quat_continuous(q: Array) -> Array:
-    """Returns a sequence (T, 4) with signs flipped so that neighbours are close."""
+    """Returns a sequence (T, 4) with signs flipped so that neighbours agree."""
     dots = (q[1:] * q[:-1]).sum(axis=-1)
     signs = np.concatenate(([1.0], np.cumprod(np.where(dots < 0, -1.0, 1.0))))
     return q * signs[:, None]

@@ -1,4 +1,4 @@
-"""The folder of a training: one at a time, never overwritten, resumed as it was."""
+"""Run folders of trainings: exclusive, never overwritten, resumable."""
 
 import fcntl
 import os
@@ -19,7 +19,7 @@ from loco_drake.common.weights import load_into, load_weights, save_weights
 
 CHECKPOINT = "checkpoint.safetensors"
 
-# What the sampler of a tracker knows of plans: nothing of those not drawn yet.
+# Scores of plans that have not been drawn yet are NaN.
 _MAY_BE_NAN = ("sampler/plan_scores", "sampler/plan_shares")
 
 Config = TypeVar("Config")
@@ -27,14 +27,14 @@ Config = TypeVar("Config")
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """What a checkpoint holds.
+    """The content of a checkpoint.
 
     Attributes:
-        path: of the file.
+        path: the file.
         tensors: networks, optimizer, random states.
-        state: everything else that training goes on from; "steps" are those done.
-        run: what the training depends on, by the name of the option.
-        options: with which the command was called, as nested JSON.
+        state: further state of the training; "steps" are those done.
+        run: options and data that the training depends on, by name.
+        options: options of the command, as nested JSON.
     """
 
     path: Path
@@ -48,14 +48,14 @@ def read_checkpoint(path: Path, name: str) -> Checkpoint:
     """Reads a checkpoint.
 
     Args:
-        path: of the file.
-        name: of the training: "tracker", "tokenizer", ...
+        path: the file.
+        name: name of the training: "tracker", "tokenizer", ...
 
     Raises:
         InputError: if the file is missing, damaged, or of another training.
     """
     tensors, header = load_weights(path, f"{name} checkpoint", _MAY_BE_NAN)
-    if "config" in header:  # as trackers were saved before there were options
+    if "config" in header:  # format of earlier trackers
         options = header["config"]["training"]
         options["environment"]["position_penalty"] = options["environment"].pop(
             "homing", 0.0
@@ -74,10 +74,10 @@ def read_checkpoint(path: Path, name: str) -> Checkpoint:
 
 
 class RunFolder:
-    """A folder that one training holds.
+    """A folder locked by one training.
 
     Attributes:
-        saved: the checkpoint to go on from, None at the start.
+        saved: the checkpoint to continue from, None at the start.
     """
 
     def __init__(
@@ -110,28 +110,28 @@ def open_run(
     resume: bool,
     options: Mapping[str, Any],
 ) -> Iterator[RunFolder]:
-    """Holds a folder for one training, which other processes are then kept out of.
+    """Locks a folder for one training.
 
     Args:
-        folder: made if there is none.
-        name: of the training: "tracker", "tokenizer", ...
-        weights: name of the file that the training ends with, or writes on the way.
-        run: what the training depends on, by the name of the option, as JSON.
-        steps: to do in all.
-        resume: go on from the checkpoint in the folder.
+        folder: created if it does not exist.
+        name: name of the training: "tracker", "tokenizer", ...
+        weights: name of the weights file that the training writes.
+        run: options and data that the training depends on, as JSON by name.
+        steps: total steps.
+        resume: whether to continue from the checkpoint in the folder.
         options: see :class:`Checkpoint`.
 
     Raises:
-        InputError: if another process trains there; if there is a run and ``resume`` is
-            not set; if it is and there is none, it is damaged, or it was of something
-            else than ``run``.
+        InputError: if another process trains in the folder; if it contains a run and
+            ``resume`` is not set; or if ``resume`` is set and there is no checkpoint,
+            it is damaged, or it does not match ``run``.
     """
     check_folder(folder, weights, resume)
     folder.mkdir(parents=True, exist_ok=True)
     handle = os.open(folder, os.O_RDONLY)
     try:
         try:
-            # The system lets go of it when the process ends, however it does.
+            # The system releases the lock when the process ends, for any reason.
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise InputError(
@@ -143,14 +143,14 @@ def open_run(
         if saved is not None:
             check_same(saved, run, settings(options), steps)
         for unfinished in folder.glob(".*.safetensors"):
-            unfinished.unlink()  # what a training was writing when it was killed
+            unfinished.unlink()  # left by a training that was killed
         yield RunFolder(folder, name, run, options, saved)
     finally:
         os.close(handle)
 
 
 def check_folder(folder: Path, weights: str, resume: bool) -> None:
-    """Raises InputError if a training cannot begin, or go on, in ``folder``."""
+    """Raises InputError if a training cannot start, or resume, in ``folder``."""
     found = [file for file in (CHECKPOINT, weights) if (folder / file).exists()]
     if resume and CHECKPOINT not in found:
         raise InputError(
@@ -167,18 +167,18 @@ def check_folder(folder: Path, weights: str, resume: bool) -> None:
 def check_same(
     saved: Checkpoint, run: Mapping[str, Any], options: Iterable[str], steps: int
 ) -> None:
-    """Raises InputError unless a checkpoint is of ``run``.
+    """Raises InputError unless a checkpoint matches ``run``.
 
     Args:
         saved: the checkpoint.
-        run: see :func:`open_run`; what the checkpoint does not know is not compared.
-        options: which of its names are those of options.
-        steps: to do in all.
+        run: see :func:`open_run`; names that the checkpoint lacks are not compared.
+        options: the names in ``run`` that are options.
+        steps: total steps.
     """
     folder = str(saved.path.parent)
     differ = [name for name in run if saved.run.get(name, run[name]) != run[name]]
     if differ:
-        # What follows from an option need not be named beside it.
+        # Name options rather than what follows from them.
         named = {x: f"--{x.replace('_', '-')}" for x in differ if x in options}
         names = named or {name: name for name in differ}
         values = [f"{y} {saved.run[x]}, not {run[x]}" for x, y in names.items()]
@@ -194,9 +194,9 @@ def check_same(
 
 
 def settings(options: Mapping[str, Any], *without: str) -> dict[str, Any]:
-    """Returns nested options under the names that the command line gives them.
+    """Returns nested options under their names on the command line.
 
-    The parts "environment" and "ppo" have no names there.
+    The parts "environment" and "ppo" have no prefix there.
     """
     flat: dict[str, Any] = {}
     for name, value in options.items():
@@ -223,9 +223,9 @@ def options_of(config: Any) -> dict[str, Any]:
 
 
 def with_options(config: Config, options: Mapping[str, Any]) -> Config:
-    """Returns a copy of a dataclass with values of :func:`options_of`.
+    """Returns a copy of a dataclass with values from :func:`options_of`.
 
-    What ``options`` lacks stays; what the dataclass lacks is left out.
+    Fields that ``options`` lacks keep their value; unknown options are ignored.
 
     Raises:
         TypeError: if a value is not of the field's type.
@@ -278,7 +278,7 @@ def learning_tensors(
 def restore_learning(
     saved: Checkpoint, module: nn.Module, optimizer: torch.optim.Optimizer
 ) -> None:
-    """Puts back what :func:`learning_tensors` returned.
+    """Restores what :func:`learning_tensors` returned.
 
     Raises:
         InputError: if the tensors do not fit.
@@ -304,18 +304,18 @@ def restore_learning(
 
 
 def load_module(saved: Checkpoint, module: nn.Module) -> None:
-    """Gives ``module`` the networks of a checkpoint.
+    """Loads the networks of a checkpoint into ``module``.
 
     Raises:
         InputError: if they do not fit.
     """
-    # Trackers of before called it "policy".
+    # Earlier trackers used the prefix "policy".
     tensors = part(saved, "module") or part(saved, "policy")
     load_into(module, tensors, saved.path)
 
 
 def part(saved: Checkpoint, name: str) -> dict[str, Tensor]:
-    """Returns the tensors of a checkpoint whose names begin with ``name/``."""
+    """Returns the tensors of a checkpoint with the prefix ``name/``, without it."""
     prefix = f"{name}/"
     return {
         key.removeprefix(prefix): value
@@ -326,7 +326,7 @@ def part(saved: Checkpoint, name: str) -> dict[str, Tensor]:
 
 @contextmanager
 def sound(path: Path) -> Iterator[None]:
-    """Within it, what cannot be used of a checkpoint is an InputError."""
+    """Converts exceptions from unusable checkpoint content to InputError."""
     try:
         yield
     except InputError:
@@ -339,7 +339,7 @@ def sound(path: Path) -> Iterator[None]:
 
 @contextmanager
 def stop_requests() -> Iterator[threading.Event]:
-    """Yields an event that Ctrl-C and SIGTERM set; a second one interrupts."""
+    """Yields an event that Ctrl-C and SIGTERM set; a second signal interrupts."""
     requested = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield requested  # only the main thread may handle signals

@@ -1,4 +1,4 @@
-"""YAML files that people write, as dataclasses, with errors that say what to mend."""
+"""YAML files as typed dataclasses, with errors that name the field."""
 
 import reprlib
 from dataclasses import fields, is_dataclass
@@ -17,17 +17,17 @@ _MAX_REASON = 200
 
 
 def read_yaml(path: Path, schema: type[T], what: str) -> T:
-    """Returns the dataclass in a YAML file; fields not named keep their default.
+    """Returns the dataclass in a YAML file; missing fields have their default.
 
     Args:
         path: the file.
         schema: a dataclass of str, float, lists, dicts by str and other dataclasses,
             all with defaults.
-        what: such a file is, for messages: "a robot file".
+        what: kind of file for messages, such as "a robot file".
 
     Raises:
-        InputError: if there is no such file, it is no YAML, or a field is unknown, with
-            those that there are, or of another type.
+        InputError: if the file does not exist or is not YAML, or a field is unknown or
+            has the wrong type.
     """
     path = Path(path)
     if not path.is_file():

@@ -1,4 +1,4 @@
-"""Network weights on disk: safetensors whose header says what they are."""
+"""Network weights as safetensors files with a descriptive header."""
 
 import json
 import math
@@ -31,13 +31,13 @@ def save_weights(
     *,
     half: bool = False,
 ) -> None:
-    """Writes ``tensors`` with their description and hash, wholly or not at all.
+    """Writes ``tensors`` with their description and hash, atomically.
 
     Args:
         path: a ``.safetensors`` file.
-        kind: what the weights are of: "tokenizer", "generator", "policy", ...
-        tensors: a state dict, of any types.
-        config: what is needed to build the network again; must be JSON.
+        kind: kind of weights: "tokenizer", "generator", "policy", ...
+        tensors: a state dict of any types.
+        config: JSON from which to rebuild the network.
         half: whether to store floating-point tensors in 16 bits.
     """
     stored = {
@@ -48,7 +48,7 @@ def save_weights(
         .clone()
         for name, value in tensors.items()
     }
-    # As it will be read back: JSON knows neither tuples nor keys that are numbers.
+    # As it is read back: JSON has no tuples and no numeric keys.
     header = json.loads(
         json.dumps({"format_version": FORMAT_VERSION, "kind": kind, "config": config})
     )
@@ -65,16 +65,16 @@ def load_weights(
 ) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """Returns the tensors and the config of a weights file.
 
-    What is stored in 16 bits is returned in 32, all else as it is. Files of earlier
-    versions, which have no hash, are read as well.
+    16-bit tensors are returned in 32 bits. Files of earlier versions have no hash and
+    are accepted.
 
     Args:
-        path: of the file.
-        kind: what it must hold.
-        may_be_nan: tensors in which NaN has a meaning; no others may hold any.
+        path: the file.
+        kind: expected kind of weights.
+        may_be_nan: names of the only tensors that may contain NaN.
 
     Raises:
-        InputError: if the file is missing, damaged, of another kind or version.
+        InputError: if the file is missing, damaged, or of another kind or version.
     """
     path = Path(path)
     if not path.is_file():
@@ -131,19 +131,20 @@ def load_into(module: torch.nn.Module, tensors: dict[str, Tensor], path: Path) -
 
 
 def read_config(config_class: type[Config], values: Any, path: Path) -> Config:
-    """Returns a dataclass from a header, each field checked.
+    """Returns a dataclass from a header, with each field checked.
 
     Args:
-        config_class: its fields are int, float, bool, str or Any, or lists or tuples
-            of these; what has a default may be missing.
+        config_class: fields are int, float, bool, str or Any, or lists or tuples of
+            these; those with a default may be missing.
         values: the fields as JSON.
-        path: of the file, for the message.
+        path: the file, for messages.
 
     Raises:
-        InputError: if a field is unknown, missing, of another type, or no size.
+        InputError: if a field is unknown, missing, of the wrong type, or an invalid
+            size.
     """
     hints = get_type_hints(config_class)
-    before = getattr(config_class, "BEFORE", {})  # what fields were called once
+    before = getattr(config_class, "BEFORE", {})  # former names of fields
     values = values if isinstance(values, dict) else {}
     values = {before.get(name, name): value for name, value in values.items()}
     needed = [
@@ -164,7 +165,7 @@ def read_config(config_class: type[Config], values: Any, path: Path) -> Config:
 
 
 def _is(hint: Any, value: Any) -> bool:
-    """Returns whether JSON is of a type, and neither endless nor a size beyond all."""
+    """Returns whether a JSON value has a type, is finite and is a reasonable size."""
     if get_origin(hint) in (list, tuple):
         item = get_args(hint)[0]
         return (
@@ -187,7 +188,7 @@ def build_network(
 ) -> Network:
     """Returns the network that a header describes, with the weights of the file.
 
-    Nothing is allocated before its shapes are known to be those of the file.
+    Allocates memory only after the shapes have been compared with the file.
 
     Raises:
         InputError: if it cannot be built, or the weights do not fit.
@@ -195,7 +196,7 @@ def build_network(
     try:
         with torch.device("meta"):
             planned = make(config)
-    except Exception:  # whatever torch makes of sizes that do not go together
+    except Exception:  # torch raises many kinds for inconsistent sizes
         raise InputError(
             f"{path} has a damaged header: no network can be built from it."
         ) from None
@@ -211,16 +212,16 @@ def load_network(
     make: Callable[[Config], Network],
     config_class: type[Config],
 ) -> Network:
-    """Returns the network of a weights file, ready for inference.
+    """Returns the network in a weights file, ready for inference.
 
     Args:
-        path: of the file.
-        kind: what it must hold.
-        make: returns the network, of any weights, from its config.
-        config_class: of the config, which is "network" in the file's; a dataclass.
+        path: the file.
+        kind: expected kind of weights.
+        make: returns the network for a config.
+        config_class: dataclass of the config, stored as "network" in the file.
 
     Raises:
-        InputError: if the file is missing, damaged, or of something else.
+        InputError: if the file is missing, damaged, or of another kind.
     """
     tensors, config = load_weights(path, kind)
     network_config = read_config(config_class, config.get("network"), path)
