@@ -1,4 +1,4 @@
-"""What generated motion costs: a chunk in the diagram, and motions by the batch.
+"""What a chunk of generated motion costs in the diagram.
 
 Times are of the process on one thread: processor time, which other work on the machine
 lengthens less than the time on the clock, which is printed, too. A chunk is about a
@@ -11,8 +11,6 @@ from the root of the repository:
 
 import statistics
 import time
-from collections.abc import Callable
-from functools import partial
 
 import torch
 import tyro
@@ -20,10 +18,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem
 
 from loco_drake.control.plan import plan_from_motion
-from loco_drake.generation.generate import generate_motion, generate_motions
+from loco_drake.generation.generate import generate_motion
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import get_robot
-from loco_drake.motion.gaits import LABELS, parse_label
+from loco_drake.motion.gaits import parse_label
 from loco_drake.systems.plan_player import PlanPlayer
 from loco_drake.systems.reference_generator import ReferenceGenerator
 from loco_drake.systems.scenario import GeneratedReference
@@ -32,13 +30,6 @@ from loco_drake.systems.toppra_smoother import ToppraSmoother
 PERIOD = 0.1  # s, of the systems' events
 
 Times = list[tuple[float, float]]  # processor time and time on the clock, s
-
-
-def timed(work: Callable[[], object]) -> tuple[float, float]:
-    """Returns how long ``work`` takes."""
-    wall, processor = time.perf_counter(), time.process_time()
-    work()
-    return time.process_time() - processor, time.perf_counter() - wall
 
 
 def planning_events(system: Diagram | LeafSystem, seconds: float) -> Times:
@@ -51,7 +42,9 @@ def planning_events(system: Diagram | LeafSystem, seconds: float) -> Times:
     simulator.Initialize()
     end, times = port.Eval(context).end_time, []
     for step in range(1, round(seconds / PERIOD) + 1):
-        cost = timed(partial(simulator.AdvanceTo, step * PERIOD))
+        wall, processor = time.perf_counter(), time.process_time()
+        simulator.AdvanceTo(step * PERIOD)
+        cost = (time.process_time() - processor, time.perf_counter() - wall)
         if port.Eval(context).end_time > end:
             end = port.Eval(context).end_time
             times.append(cost)
@@ -83,40 +76,15 @@ def row(name: str, times: Times) -> str:
     return f"| {name}, {len(times)} times | {' | '.join(cells)} |"
 
 
-def main(
-    robot: str = "go2",
-    seconds: float = 30.0,
-    count: int = 32,
-    duration: float = 10.0,
-    gait: str = "dog-trot",
-) -> None:
-    """Prints two tables.
-
-    Args:
-        robot: to generate for.
-        seconds: of simulation.
-        count: motions side by side.
-        duration: of each, in s.
-        gait: of the simulation.
-    """
+def main(robot: str = "go2", seconds: float = 30.0, gait: str = "dog-trot") -> None:
+    """Prints the table, of so many seconds of simulation."""
     torch.set_num_threads(1)
-    model = pretrained_motion_model(robot)
     print("| ms | processor, median | most | clock, median | most |")
     print("|---|---:|---:|---:|---:|")
     generator = ReferenceGenerator(get_robot(robot), GeneratedReference(gait=gait))
     print(row("a chunk of motion", planning_events(generator, seconds)))
     smoother = smoother_alone(robot, gait, seconds + 5)
     print(row("smoothing a chunk", planning_events(smoother, seconds)))
-    print("\n| times real time | by processor | by the clock |")
-    print("|---|---:|---:|")
-    for size in sorted({1, count}):
-        costs = [
-            timed(partial(generate_motions, model, k, duration, range(size)))
-            for k in (parse_label(gait), LABELS[-1], parse_label(gait))
-        ][1:]
-        made = len(costs) * size * duration
-        speeds = [f"{made / sum(column):.0f}" for column in zip(*costs, strict=True)]
-        print(f"| {size} side by side | {' | '.join(speeds)} |")
 
 
 if __name__ == "__main__":

@@ -1,30 +1,177 @@
 """Draws pictures of the documentation, with the shipped weights.
 
-From the root of the repository; `library` after ``loco-drake retarget``:
+From the root of the repository; `library` after ``loco-drake retarget``. The first two
+need Chromium on the path (``chromium``, headless), `retargeting` the recordings, too:
 
+    python docs/draw.py robot docs/images/go2_trot.png
+    python docs/draw.py retargeting docs/images/retargeting.png --html replay.html
     python docs/draw.py gait-change docs/images/gait_change.png
     python docs/draw.py library docs/images/library.png
 
 ``loco-drake evaluate ... --figures`` draws the others.
 """
 
+import subprocess
+import tempfile
 from pathlib import Path
 
+import numpy as np
 import tyro
-from matplotlib.figure import Figure
+from pydrake.geometry import Meshcat, MeshcatVisualizer, Rgba, Sphere
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.systems.framework import DiagramBuilder
 
+from loco_drake.cli.output import write_figure
 from loco_drake.common.files import atomic_path
+from loco_drake.datasets.registry import data_dir
+from loco_drake.datasets.segments import read_segments, select_labels
 from loco_drake.evaluation.dataset_picture import describe, library_figure
 from loco_drake.evaluation.gait_change import change_figure
+from loco_drake.evaluation.rollout import Recorder, dress
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
+from loco_drake.models.ground import AddGround
+from loco_drake.models.plant import PlantConfig
+from loco_drake.models.robots import ROBOTS, AddRobotModel, get_robot
 from loco_drake.motion.gait_schedule import parse_schedule
 from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.motion import FPS
 from loco_drake.motion.motion_file import load_motion
+from loco_drake.retargeting.retarget import retarget_clip
+from loco_drake.retargeting.scaling import resample
+from loco_drake.systems.keypoint_visualizer import COLORS, NAMES
+from loco_drake.systems.scenario import GeneratedReference, Scenario, TrainedPolicy
+
+Png = tyro.conf.Positional[Path]
+
+_CHROMIUM = (
+    "chromium --headless=new --no-sandbox --disable-dev-shm-usage --hide-scrollbars "
+    "--use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader "
+    "--disable-background-networking --no-first-run --virtual-time-budget=20000"
+)
+_RADIUS = 0.02  # of the animal's keypoints, m
+_ZOOM = ("/Cameras/default/rotated/<object>", "zoom")
+
+
+def robot(
+    png: Png,
+    gait: str = "dog-trot",
+    seed: int = 3,
+    time: float = 3.1,
+    policy: Path | None = None,
+    size: tuple[int, int] = (1280, 640),
+) -> None:
+    """The Go2 in the middle of a gait, ``time`` s after its start, and its plan."""
+    meshcat = Meshcat()
+    dress(meshcat)
+    scenario = Scenario(
+        plant=PlantConfig(visual=True),
+        reference=GeneratedReference(gait=gait, seed=seed),
+        policy=TrainedPolicy(weights=policy),
+    )
+    recorder = Recorder(scenario, meshcat)
+    recorder.start()
+    rollout, _ = recorder.run(time)
+    recorder.diagram.ForcedPublish(recorder.context)
+    x, y, _ = rollout.state[-1, 4:7]
+    meshcat.SetCameraPose([x + 0.75, y - 0.95, 0.5], [x + 0.02, y, 0.2])
+    take_picture(meshcat, png, size)
+
+
+def retargeting(
+    png: Png,
+    label: str = "dog-trot",
+    stretch: int = 1,
+    time: float = 2.02,
+    seconds: float = 2.5,
+    gap: float = 0.6,
+    html: Path | None = None,
+    data: Path | None = None,
+    size: tuple[int, int] = (1280, 560),
+) -> None:
+    """An animal's keypoints and both robots that do the same, side by side.
+
+    Front toes are blue, rear toes red, withers and hip green.
+
+    Args:
+        png: the picture.
+        label: such as dog-trot.
+        stretch: which of the label's stretches, from 0.
+        time: of the picture, s.
+        seconds: of the replay.
+        gap: between the animal and the robots, m.
+        html: where to save the replay.
+        data: folder of the recordings.
+        size: of the picture, pixels.
+    """
+    segment = select_labels(read_segments(data_dir(data)), [label])[stretch]
+    clip = segment.read()
+    resampled = resample(clip, FPS)
+    points = np.concatenate(
+        (resampled.toes, resampled.withers[:, None], resampled.hip[:, None]), axis=1
+    )
+    # All are at x = 0 at the time of the picture.
+    frame = round(time * FPS)
+    points[..., 0] -= points[frame, 4:, 0].mean()
+    meshcat = Meshcat()
+    dress(meshcat)
+    for name, color in zip(NAMES, COLORS, strict=True):
+        meshcat.SetObject(f"animal/{name}", Sphere(_RADIUS), color)
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
+    positions = []
+    for place, name in enumerate(ROBOTS, start=1):
+        instance = AddRobotModel(Parser(plant), name, visual=True)
+        motion, _ = retarget_clip(clip, get_robot(name))
+        shift = [-motion.base_position[frame, 0], -place * gap, 0.0]
+        q = (motion.base_quaternion, motion.base_position + shift)
+        positions.append((instance, np.hstack((*q, motion.joint_positions))))
+    AddGround(plant, friction=1.0, visual=True)
+    plant.Finalize()
+    MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+
+    def draw(k: int, time: float = 0.0) -> None:
+        context.SetTime(time)
+        for instance, q in positions:
+            own = plant.GetMyMutableContextFromRoot(context)
+            plant.SetPositions(own, instance, q[k])
+        for name, p_W in zip(NAMES, points[k], strict=True):
+            meshcat.SetTransform(f"animal/{name}", RigidTransform(p_W), time)
+        diagram.ForcedPublish(context)
+
+    draw(frame)
+    toes, withers, hip = points[frame, :4], points[frame, 4], points[frame, 5]
+    ends = np.array([hip, withers, withers, hip, hip]), np.array([withers, *toes])
+    meshcat.SetLineSegments("lines", ends[0].T, ends[1].T, 3.0, Rgba(0.2, 0.2, 0.2))
+    meshcat.SetCameraPose([2.0, 1.0 - gap, 0.9], [0.0, 0.04 - gap, 0.19])
+    # Meshcat's camera sees 75 degrees: a longer lens, from further away.
+    meshcat.SetProperty(*_ZOOM, 2.6)
+    take_picture(meshcat, png, size)
+    if html is None:
+        return
+    # The seconds around the picture, so that all pass by the camera; every other
+    # frame, since the page is nearly full of meshes.
+    meshcat.Delete("lines")
+    meshcat.SetProperty(*_ZOOM, 1.0)
+    first = max(0, frame - round(seconds * FPS / 2))
+    last = min(len(points), first + round(seconds * FPS))
+    meshcat.SetCameraPose([0.0, 2.2, 1.1], [0.0, 0.0, 0.2])
+    meshcat.StartRecording(frames_per_second=FPS / 2)
+    for k in range(first, last, 2):
+        draw(k, (k - first) / FPS)
+    meshcat.PublishRecording()
+    with atomic_path(html) as temporary:
+        temporary.write_text(meshcat.StaticHtml())
+    size_mb = html.stat().st_size / 1e6
+    print(f"{html}: {size_mb:.1f} MB, {(last - first) / FPS:.1f} s")
 
 
 def gait_change(
-    png: tyro.conf.Positional[Path],
+    png: Png,
     gait: str = "dog-pace,dog-trot@3,dog-gallop@6",
     duration: float = 9.0,
     seed: int = 0,
@@ -33,26 +180,38 @@ def gait_change(
     """A motion that changes its gait twice: its feet and its speed."""
     model, schedule = pretrained_motion_model(robot), parse_schedule(gait)
     (motion,) = generate_motions(model, schedule, duration, [seed])
-    write(change_figure(model.robot, motion, schedule), png)
+    write_figure(change_figure(model.robot, motion, schedule), png, dpi=80)
 
 
-def library(
-    png: tyro.conf.Positional[Path], motions: Path = Path("motions/go2")
-) -> None:
+def library(png: Png, motions: Path = Path("motions/go2")) -> None:
     """How much motion there is in a folder of Motion files, and how it differs."""
     loaded = map(load_motion, sorted(motions.glob("*.npz")))
     points = [describe(motion) for motion in loaded if motion.label in LABELS]
     title = f"{len(points)} stretches of motion, {sum(p.seconds for p in points):.0f} s"
-    write(library_figure(points, title), png)
+    write_figure(library_figure(points, title), png, dpi=80)
 
 
-def write(figure: Figure, png: Path) -> None:
-    """Writes the picture, wholly or not at all."""
-    with atomic_path(png) as temporary:
-        figure.savefig(temporary, dpi=80)
+def take_picture(meshcat: Meshcat, png: Path, size: tuple[int, int]) -> None:
+    """Writes a picture of what Meshcat shows, ``size`` pixels wide and high."""
+    png.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "page.html"
+        page.write_text(meshcat.StaticHtml())
+        options = (
+            f"--user-data-dir={folder}/profile",
+            f"--window-size={size[0]},{size[1]}",
+            f"--screenshot={png.resolve()}",
+        )
+        command = [*_CHROMIUM.split(), *options, page.as_uri()]
+        subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
 
 
 if __name__ == "__main__":
     tyro.extras.subcommand_cli_from_dict(
-        {"gait-change": gait_change, "library": library}
+        {
+            "robot": robot,
+            "retargeting": retargeting,
+            "gait-change": gait_change,
+            "library": library,
+        }
     )

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from loco_drake.cli.evaluation import Evaluation, trained_on, write_figure
-from loco_drake.cli.output import print_failed, print_table
-from loco_drake.common.errors import InputError, check_at_least
+from loco_drake.cli.evaluation import Evaluation, print_report, trained_on
+from loco_drake.cli.output import print_failed, write_figure
+from loco_drake.common.errors import InputError
 
 
 @dataclass(kw_only=True)
@@ -25,17 +25,13 @@ class EvaluateTokenizer(Evaluation):
     """Number of codebooks to decode from, the coarsest first. Default: all."""
     figures: Path | None = None
     """Folder for a plot of codebook usage."""
-    seeds: int = 1
-    """Accepted by every evaluation; a tokenizer is deterministic."""
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""
-        from loco_drake.datasets.registry import data_dir
         from loco_drake.generation.tokenizer import load_tokenizer
         from loco_drake.models.shipped import pretrained_path
 
-        check_at_least("seeds", self.seeds, 1)
-        self._folder = data_dir(self.data_dir)
+        super().check()
         self._path = self.tokenizer or pretrained_path("tokenizer")
         self._tokenizer = load_tokenizer(self._path)
         books = self._tokenizer.config.codebooks
@@ -48,7 +44,6 @@ class EvaluateTokenizer(Evaluation):
     def of_robot(self, name: str) -> dict[str, Any]:
         """Returns the figures of one robot."""
         from loco_drake.evaluation.generation_pictures import code_use_figure
-        from loco_drake.evaluation.recorded import retarget_recordings
         from loco_drake.evaluation.tokenizer import evaluate_tokenizer
         from loco_drake.models.robots import get_robot
 
@@ -58,9 +53,7 @@ class EvaluateTokenizer(Evaluation):
                 f"The tokenizer's weights are not for the robot {name!r}; they are "
                 f"for {', '.join(robots)}."
             )
-        robot = get_robot(name)
-        recorded = retarget_recordings(self._folder, robot, self.labels, self.workers)
-        print_failed(recorded.failed.items())
+        recorded = self.retarget(get_robot(name))
         seen = trained_on({"tokenizer": self._path}, recorded, name)
         figures, counts = evaluate_tokenizer(self._tokenizer, recorded, self.books)
         if self.figures is not None:
@@ -69,30 +62,13 @@ class EvaluateTokenizer(Evaluation):
             write_figure(picture, self.figures / f"{name}-codes.png")
         return {**figures, "validation_trained_on": seen}
 
-    def show(self, name: str, figures: dict[str, Any]) -> None:
-        """Prints a table of all labels."""
+    def show(self, name: str, figures: dict[str, Any]) -> int:
+        """Prints a table of all labels; returns 0."""
+        from loco_drake.evaluation.report.results import Figures
+        from loco_drake.evaluation.report.sections import tokenizer_table
+
         if figures["labels"] is None:
             print_failed([(name, figures["reason"])])
-            return
-        held_out, train = (
-            {**part["labels"], "all": part["all"]}
-            for part in (figures, figures["train"])
-        )
-        print_table(
-            f"{name}: {figures['codebook_use']:.0%} of the codes are used",
-            [
-                "recordings",
-                "held out: joint RMSE rad",
-                "toe error mm",
-                "train: joint RMSE rad",
-                "toe error mm",
-            ],
-            [[k, *_cells(held_out[k]), *_cells(train[k])] for k in train],
-        )
-
-
-def _cells(figures: dict[str, float | None]) -> list[str]:
-    joints, toes = figures["joint_rmse_rad"], figures["toe_error_rmse_m"]
-    if joints is None or toes is None:
-        return ["-", "-"]
-    return [f"{joints:.4f}", f"{1000 * toes:.1f}"]
+        else:
+            print_report(tokenizer_table(name, Figures(figures)))
+        return 0

@@ -7,31 +7,14 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import Progress
 
-from loco_drake.cli.evaluation import Evaluation
-from loco_drake.cli.output import print_figures
-from loco_drake.common.errors import check_at_least, check_choice
+from loco_drake.cli.evaluation import Evaluation, print_by_label
+from loco_drake.common.errors import check_choice
 from loco_drake.motion.gaits import any_label, parse_label
 from loco_drake.tracking.randomization import RandomizationConfig
 
 if TYPE_CHECKING:
     from loco_drake.evaluation.tracking_table import Trial
     from loco_drake.systems.scenario import Scenario
-
-# Title: key, factor, digits.
-_COLUMNS = {
-    "return": ("normalized_return", 1, 1),
-    "worst": ("normalized_return_worst", 1, 1),
-    "falls %": ("fall_rate", 100, 0),
-    "joints rad": ("joint_rmse_rad", 1, 3),
-    "base m": ("base_position_rmse_m", 1, 3),
-    "base rad": ("base_orientation_rmse_rad", 1, 3),
-    "slip m/s": ("stance_slip_median_mps", 1, 3),
-    "stretch": ("stretch", 1, 3),
-    "m/s": ("speed_mps", 1, 2),
-    "torque limit %": ("torque_saturation", 100, 1),
-    "transport": ("cost_of_transport", 1, 2),
-    "episodes": ("episodes", 1, 0),
-}
 
 
 @dataclass(kw_only=True)
@@ -77,9 +60,10 @@ class EvaluateTracking(Evaluation):
         """Raises InputError if an option is wrong."""
         from loco_drake.generation.generate import check_duration
 
+        self.check_robot()
+        self.check_numbers()
         check_choice("reference", self.reference, ("generated", "retargeted"))
         check_duration(self.duration)
-        check_at_least("seeds", self.seeds, 1)
         if self.pushes:
             self.randomization = replace(
                 self.randomization,
@@ -167,12 +151,13 @@ class EvaluateTracking(Evaluation):
             **summarize(episodes),
         }
 
-    def show(self, name: str, figures: dict[str, Any]) -> None:
-        """Prints a table of all labels."""
+    def show(self, name: str, figures: dict[str, Any]) -> int:
+        """Prints a table of all labels; returns 0."""
         world = "" if self.randomization.is_off else ", randomized"
         title = (
             f"{name}, {self.reference}, {self.contact}{world}: "
             f"{figures['real_time_factor']:.1f} times real time"
         )
         rows = {**figures["labels"], "all of these": figures["all"]}
-        print_figures(title, "label", _COLUMNS, rows)
+        print_by_label(title, ["tracking", "tracking_more"], rows)
+        return 0

@@ -1,21 +1,20 @@
 """Options and steps that the ``evaluate`` commands share."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.console import Console
 
-from loco_drake.cli.output import write_results
+from loco_drake.cli.output import print_failed, print_table, write_results
 from loco_drake.common.errors import InputError, check_at_least, check_choice
-from loco_drake.common.files import atomic_path
 from loco_drake.motion.gaits import parse_label
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from loco_drake.evaluation.recorded import Recorded
+    from loco_drake.evaluation.report.tables import Table
+    from loco_drake.models.robots import Robot
 
 
 @dataclass(kw_only=True)
@@ -34,33 +33,44 @@ class Evaluation:
     folder."""
     workers: int = 1
     """Number of worker processes."""
+    seeds: int = 1
+    """Accepted by every evaluation; this one is deterministic."""
     seed: int = 0
     """Accepted by every command; this one uses no random numbers."""
     json: Path | None = None
     """Write the figures to this JSON file."""
 
     def run(self) -> int:
-        """Prints tables for each robot and writes the figures; returns 0.
+        """Prints tables for each robot and writes the figures; returns the exit status.
 
         Raises:
             InputError: if an option is wrong, or there is nothing to evaluate.
         """
         from loco_drake.models.robots import ROBOTS
 
-        check_choice("robot", self.robot, (*ROBOTS, "all"))
-        check_at_least("workers", self.workers, 1)
-        check_at_least("seed", self.seed, 0)
-        for label in self.labels:
-            parse_label(label)
         self.check()
         result = self.of_robots(list(ROBOTS) if self.robot == "all" else [self.robot])
         write_results(self.json, result)
-        for name, figures in result.get("robots", {self.robot: result}).items():
-            self.show(name, figures)
-        return 0
+        robots = result.get("robots", {self.robot: result})
+        return max(self.show(name, figures) for name, figures in robots.items())
 
     def check(self) -> None:
-        """Raises InputError if an option of this command is wrong."""
+        """Raises InputError if an option is wrong."""
+        self.check_robot()
+        self.check_numbers()
+        for label in self.labels:
+            parse_label(label)
+
+    def check_robot(self) -> None:
+        """Raises InputError unless the robot is one of the two, or all."""
+        from loco_drake.models.robots import ROBOTS
+
+        check_choice("robot", self.robot, (*ROBOTS, "all"))
+
+    def check_numbers(self) -> None:
+        """Raises InputError if there are too few seeds or workers."""
+        for name, least in (("workers", 1), ("seeds", 1), ("seed", 0)):
+            check_at_least(name, getattr(self, name), least)
 
     def of_robots(self, names: list[str]) -> dict[str, Any]:
         """Returns the figures of one robot, or of all by name.
@@ -86,9 +96,19 @@ class Evaluation:
         """Returns the figures of one robot."""
         raise NotImplementedError
 
-    def show(self, name: str, figures: dict[str, Any]) -> None:
-        """Prints what :meth:`of_robot` returned."""
+    def show(self, name: str, figures: dict[str, Any]) -> int:
+        """Prints figures of a robot; returns the exit status."""
         raise NotImplementedError
+
+    def retarget(self, robot: "Robot") -> "Recorded":
+        """Returns the recordings as motion of a robot; says which failed."""
+        from loco_drake.datasets.registry import data_dir
+        from loco_drake.evaluation.recorded import retarget_recordings
+
+        folder = data_dir(self.data_dir)
+        recorded = retarget_recordings(folder, robot, self.labels, self.workers)
+        print_failed(recorded.failed.items())
+        return recorded
 
 
 def say_of(robot: str) -> Callable[[str], None]:
@@ -127,15 +147,35 @@ def trained_on(
     return result
 
 
-def estimate_text(estimate: dict[str, float] | None) -> str:
-    """Returns an estimate as ``.950 [.910, .980]``."""
-    if estimate is None:
-        return "-"
-    mean, low, high = (estimate[key] for key in ("mean", "low", "high"))
-    return f"{mean:.3f} [{low:.3f}, {high:.3f}]"
+def print_by_label(
+    title: str, kinds: Sequence[str], rows: Mapping[str, Mapping[str, Any]]
+) -> None:
+    """Prints figures, row by row, in the columns that the report has for them.
+
+    Args:
+        title: over the table.
+        kinds: of columns, as ``report.yaml`` calls them.
+        rows: figures by label.
+    """
+    from loco_drake.evaluation.report.content import CONTENT
+    from loco_drake.evaluation.report.results import Figures
+    from loco_drake.evaluation.report.tables import figures_table
+
+    found = {name: Figures(dict(figures)) for name, figures in rows.items()}
+    columns = [column for kind in kinds for column in CONTENT.columns[kind]]
+    print_report(figures_table(title, "label", columns, found))
 
 
-def write_figure(figure: "Figure", path: Path) -> None:
-    """Writes a picture, wholly or not at all."""
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=120)
+def print_report(table: "Table") -> None:
+    """Prints a table of the report."""
+    columns = list(table.columns)
+    if table.groups:
+        share = len(columns) // len(table.groups)
+        columns = [f"{table.groups[i // share]}: {c}" for i, c in enumerate(columns)]
+    rows = [
+        (row.title, *(f"{cell.text} {cell.note}".strip() for cell in row.cells))
+        for row in table.rows
+    ]
+    print_table(table.title, (table.first, *columns), rows)
+    for text in filter(None, (table.note, *table.reasons)):
+        print(text)

@@ -4,7 +4,7 @@ import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -14,12 +14,21 @@ from rich.text import Text
 from loco_drake.common.errors import one_line
 from loco_drake.common.files import atomic_path, figures_sha256
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 def write_json(path: Path | None, figures: dict[str, Any]) -> None:
     """Writes a command's figures to ``path``; None writes nothing."""
     if path is not None:
         with atomic_path(path) as temporary:
             temporary.write_text(json.dumps(figures, indent=2) + "\n")
+
+
+def write_figure(figure: "Figure", path: Path, dpi: int = 120) -> None:
+    """Writes a picture, wholly or not at all."""
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=dpi)
 
 
 def write_results(path: Path | None, figures: dict[str, Any]) -> None:
@@ -51,39 +60,9 @@ def print_table(
     Console(width=None if sys.stdout.isatty() else 160).print(table)
 
 
-def print_figures(
-    title: str,
-    first: str,
-    columns: Mapping[str, tuple[str, float, int]],
-    rows: Mapping[str, Mapping[str, Any]],
-) -> None:
-    """Prints figures by name as a table to stdout.
-
-    Args:
-        title: over the table.
-        first: title of the first column, which holds the keys of ``rows``.
-        columns: title to key, factor and digits of what is printed.
-        rows: figures, numbers or None, of each row by key.
-    """
-
-    def text(value: float | None, factor: float, digits: int) -> str:
-        return "-" if value is None else f"{value * factor:.{digits}f}"
-
-    print_table(
-        title,
-        [first, *columns],
-        (
-            [name] + [text(row[key], factor, n) for key, factor, n in columns.values()]
-            for name, row in rows.items()
-        ),
-    )
-
-
 def print_failed(failed: Iterable[tuple[str, str]]) -> None:
     """Says on stderr which clips failed, and why."""
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
-    for name, error in failed:
-        console.print(one_line(f"Failed: {name}: {error}"), markup=False)
+    _print_of_clips("Failed", failed)
 
 
 # Behind the name of a row whose figures are outside their bounds.
@@ -96,10 +75,12 @@ def print_warnings(warnings: Mapping[str, Sequence[str]]) -> None:
     Args:
         warnings: sentences by clip; nothing is printed if there is none.
     """
-    if not warnings:
-        return
-    print(f"(!) Outside their bounds, see the warnings: {len(warnings)}")
+    if warnings:
+        print(f"(!) Outside their bounds, see the warnings: {len(warnings)}")
+    _print_of_clips("Warning", ((k, "; ".join(v)) for k, v in warnings.items()))
+
+
+def _print_of_clips(what: str, texts: Iterable[tuple[str, str]]) -> None:
     console = Console(stderr=True, highlight=False, soft_wrap=True)
-    for name, sentences in warnings.items():
-        text = f"Warning: {name}: {'; '.join(sentences)}"
-        console.print(one_line(text), markup=False)
+    for name, text in texts:
+        console.print(one_line(f"{what}: {name}: {text}"), markup=False)

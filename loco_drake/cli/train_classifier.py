@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from loco_drake.cli.evaluation import estimate_text
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.cli.training import print_stopped
 from loco_drake.common.errors import InputError
@@ -42,14 +41,15 @@ class TrainClassifier(LoopSettings):
         """
         self.check()
         from loco_drake.common.run_folder import check_folder
-        from loco_drake.evaluation.classifier import ClassifierConfig, predict
+        from loco_drake.evaluation.classifier import (
+            ClassifierConfig,
+            class_indices,
+            predict,
+            train_classifier,
+        )
         from loco_drake.evaluation.confidence import accuracy
         from loco_drake.evaluation.recorded import load_recorded
         from loco_drake.evaluation.samples import SECONDS, label_weights, make_samples
-        from loco_drake.evaluation.train_classifier import (
-            class_indices,
-            train_classifier,
-        )
         from loco_drake.retargeting.trajectories import trajectories
 
         check_folder(self.out, f"{self.NAME}.safetensors", self.resume)
@@ -85,11 +85,10 @@ class TrainClassifier(LoopSettings):
                 right = class_indices(samples.labels, labels)
                 correct = predict(classifier, samples.channels) == right[:, None]
                 weights = label_weights(samples.labels)
-                estimate = asdict(
-                    accuracy(correct.mean(axis=1)[None], weights, samples.subjects)
-                )
-            figures[f"{name}_accuracy"] = estimate
-            rows.append([name, str(len(motions)), estimate_text(estimate)])
+                correct = correct.mean(axis=1)[None]
+                estimate = accuracy(correct, weights, samples.subjects)
+            figures[f"{name}_accuracy"] = estimate and asdict(estimate)
+            rows.append([name, str(len(motions)), str(estimate or "-")])
         write_json(self.json, figures)
         title = f"{self.out / 'classifier.safetensors'}: {', '.join(labels)}"
         print_table(title, ["recordings", "trajectories", "accuracy"], rows)

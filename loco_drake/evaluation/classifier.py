@@ -1,24 +1,34 @@
-"""The classifier that tells which gait a trajectory is of: a small transformer.
+"""Classifiers that tell which gait a trajectory is of: a transformer, a linear one.
 
-After PoseGPT's (Lucas et al. 2022), on which the paper's Table 1 is built: attention
-over short stretches of the trajectory, averaged over time, then a layer of few
-channels that the Frechet distance is measured on.
+The transformer is after PoseGPT's (Lucas et al. 2022), on which the paper's Table 1 is
+built: attention over short stretches of the trajectory, averaged over time, then a
+layer of few channels that the Frechet distance is measured on.
 """
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from sklearn.linear_model import LogisticRegression
+from sklearn.pipeline import Pipeline, make_pipeline
+from sklearn.preprocessing import StandardScaler
 from torch import Tensor, nn
+from torch.nn import functional
 
 from loco_drake.common.determinism import single_thread
 from loco_drake.common.weights import load_network, save_weights
-from loco_drake.evaluation.samples import CHANNELS, FRAMES
+from loco_drake.evaluation.samples import CHANNELS, FRAMES, Samples, label_weights
+from loco_drake.generation.loop_settings import LoopSettings
+from loco_drake.generation.training import LoopResult, train
+from loco_drake.motion.gaits import LABELS
 
 Array = NDArray[np.float64]
+
+BATCH = 48
+STEPS = 300
+LEARNING_RATE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -119,14 +129,6 @@ def predict(classifier: GaitClassifier, channels: Array) -> NDArray[np.int64]:
     return logits.argmax(dim=-1).numpy()
 
 
-def save_classifier(
-    classifier: GaitClassifier, path: Path, info: dict[str, Any]
-) -> None:
-    """Writes the weights; ``info`` is added to the header for people."""
-    config = {"network": asdict(classifier.config), "info": info}
-    save_weights(path, "classifier", classifier.state_dict(), config)
-
-
 def load_classifier(path: Path) -> GaitClassifier:
     """Reads a classifier, ready for inference.
 
@@ -134,3 +136,65 @@ def load_classifier(path: Path) -> GaitClassifier:
         InputError: if the file is missing, damaged, or of something else.
     """
     return load_network(path, "classifier", GaitClassifier, ClassifierConfig)
+
+
+def train_classifier(
+    samples: Samples, config: ClassifierConfig, settings: LoopSettings
+) -> tuple[GaitClassifier, LoopResult]:
+    """Trains a classifier and writes ``classifier.safetensors`` if it was not stopped.
+
+    All labels are seen equally often, and every trajectory as it is as often as
+    mirrored.
+
+    Args:
+        samples: of the labels in ``config``; others are not looked at.
+        config: sizes of the network.
+        settings: of the training.
+    """
+    classes = class_indices(samples.labels, config.labels)
+    samples, classes = samples[classes >= 0], classes[classes >= 0]
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(settings.seed)
+        classifier = GaitClassifier(config)
+    channels = torch.tensor(samples.channels, dtype=torch.float32)
+    classifier.set_statistics(channels.reshape(-1, CHANNELS))
+    targets = torch.tensor(classes)
+    weights = label_weights(samples.labels)
+
+    def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
+        rows = random.choice(len(samples), size=BATCH, p=weights)
+        batch = channels[rows, random.integers(2, size=BATCH)]
+        logits = classifier(batch)
+        loss = functional.cross_entropy(logits, targets[rows], label_smoothing=0.05)
+        right = (logits.argmax(dim=-1) == targets[rows]).float().mean()
+        return loss, {"accuracy": right.item()}
+
+    run = {"network": asdict(config), "motions": f"{len(samples)} trajectories"}
+    result = train("classifier", classifier, loss_of_batch, settings, run)
+    classifier.requires_grad_(False)
+    if not result.stopped:
+        path = Path(settings.out) / "classifier.safetensors"
+        header = {"network": asdict(config), "info": {"trajectories": len(samples)}}
+        save_weights(path, "classifier", classifier.state_dict(), header)
+    return classifier, result
+
+
+def class_indices(
+    labels: NDArray[np.int64], names: tuple[str, ...]
+) -> NDArray[np.int64]:
+    """Returns the place in ``names`` of each index into LABELS, -1 where it is not."""
+    known = map(str, LABELS)
+    return np.array([names.index(k) if k in names else -1 for k in known])[labels]
+
+
+def fit_linear(features: Array, classes: NDArray[np.int64]) -> Pipeline:
+    """Fits a multinomial logistic regression on standardized features.
+
+    Args:
+        features: shape (N, C).
+        classes: shape (N,); all weigh the same, however many rows each has.
+    """
+    return make_pipeline(
+        StandardScaler(),
+        LogisticRegression(C=1.0, class_weight="balanced", max_iter=3000),
+    ).fit(features, classes)

@@ -20,6 +20,9 @@ class Estimate:
     low: float
     high: float
 
+    def __str__(self) -> str:
+        return f"{self.mean:.3f} [{self.low:.3f}, {self.high:.3f}]"
+
 
 def wilson(share: float, count: float) -> tuple[float, float]:
     """Returns Wilson's 95 % interval of a share that was seen in ``count`` trials.

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,11 @@ from threadpoolctl import threadpool_limits
 from loco_drake.common.errors import InputError
 from loco_drake.evaluation import drift as drifting
 from loco_drake.evaluation.classifier import embeddings
-from loco_drake.evaluation.frechet import frechet_distance, moments
+from loco_drake.evaluation.distances import frechet_distance, moments, nearest_distances
+from loco_drake.evaluation.effort import Effort
 from loco_drake.evaluation.motion_scores import compare, measure, overall
-from loco_drake.evaluation.nearest import nearest_distances
 from loco_drake.evaluation.recognition import (
+    Fit,
     Recognition,
     TransformerRecognizer,
     linear_recognizer,
@@ -36,7 +38,6 @@ from loco_drake.motion.motion import Motion
 from loco_drake.retargeting.trajectories import trajectories
 
 Array = NDArray[np.float64]
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,28 +53,14 @@ class Generated:
     long: dict[str, list[Motion]]
 
 
-@dataclass(frozen=True, eq=False)
-class GenerationScore:
-    """The figures, and what pictures of them are made of.
-
-    Attributes:
-        figures: as JSON.
-        recognition: by kind of classifier.
-    """
-
-    figures: dict[str, Any]
-    recognition: dict[str, Recognition]
-
-
 def score_generation(
     robot: Robot,
     recorded: Recorded,
     generated: Generated,
-    *,
-    seeds: Sequence[int],
-    steps: int,
-    say: Say = lambda text: None,
-) -> GenerationScore:
+    effort: Effort,
+    seed: int,
+    say: Callable[[str], None] = lambda text: None,
+) -> tuple[dict[str, Any], dict[str, Recognition]]:
     """Compares generated with recorded motion of one robot.
 
     Only labels that recordings of both sides and generated motion have are compared.
@@ -82,9 +69,12 @@ def score_generation(
         robot: that of all motions.
         recorded: whole stretches.
         generated: what is scored.
-        seeds: of the classifiers; all else that is random follows the first.
-        steps: of the transformer's training.
+        effort: how many classifiers are trained, and how long.
+        seed: of the first classifier; all else that is random follows it.
         say: is told what goes on.
+
+    Returns:
+        The figures, as JSON; what the classifiers did, by their kind.
 
     Raises:
         InputError: if there are fewer than two such labels.
@@ -95,26 +85,29 @@ def score_generation(
             "To tell gaits apart takes two labels at least, with recordings for "
             f"training and for validation; there are {', '.join(names) or 'none'}."
         )
-    train, validation = (
+    train, validation, *sets = (
         [m for m in side if str(m.label) in names]
-        for side in (recorded.train, recorded.validation)
+        for side in (recorded.train, recorded.validation, *generated.sets)
     )
-    sets = [[m for m in each if str(m.label) in names] for each in generated.sets]
     cut_train, cut_validation = (
         [part for motion in side for part in trajectories(motion)]
         for side in (train, validation)
     )
+    seeds = list(range(seed, seed + effort.seeds))
+    fits: dict[str, Fit] = {
+        "transformer": partial(TransformerRecognizer, steps=effort.steps),
+        "linear": linear_recognizer,
+    }
+    reason: dict[str, str] = {}
     with threadpool_limits(1):  # the same figures on any machine
         of_train = make_samples(robot, cut_train)
         of_validation = make_samples(robot, cut_validation)
         of_sets = _samples_of_sets(robot, sets)
         recognition = {}
-        for kind, fit in (
-            ("transformer", lambda s, seed: TransformerRecognizer(s, seed, steps)),
-            ("linear", linear_recognizer),
-        ):
+        for kind, fit in fits.items():
+            say(f"Training {kind} classifiers")
             recognition[kind] = recognize(
-                fit, of_train, of_validation, of_sets, seeds, _prefix(kind, say)
+                fit, of_train, of_validation, of_sets, seeds, say
             )
         say("Comparing real with generated motion")
         figures: dict[str, Any] = {
@@ -123,20 +116,21 @@ def score_generation(
                 "validation": len(of_validation),
                 "generated": sum(map(len, of_sets)),
             },
-            "classifiers": {kind: _rows(found) for kind, found in recognition.items()},
+            "classifiers": {kind: found.rows() for kind, found in recognition.items()},
             "confusion": _confusion(recognition),
-            **_two_sample(of_train, of_validation, join(of_sets), list(seeds)),
+            **_two_sample(of_train, of_validation, join(of_sets), seeds),
             **_frechet(recognition["transformer"], of_train, of_validation, of_sets),
             **_nearest(train, cut_train, cut_validation, sets),
             **_drift(robot, generated.long, recorded),
             **_by_label(robot, recorded, generated),
-            "reason": {},
+            "reason": reason,
         }
-    few = f"Fewer than {FOLDS} subjects on a side."
     for name in ("two_sample_accuracy", "two_sample_accuracy_real_real"):
         if figures[name] is None:
-            figures["reason"][name] = few
-    return GenerationScore(figures, recognition)
+            reason[name] = f"Fewer than {FOLDS} subjects on a side."
+    if figures["drift_60s"] is None:
+        reason["drift_60s"] = "No label has two motions of a minute."
+    return figures, recognition
 
 
 def _samples_of_sets(robot: Robot, sets: Sequence[Sequence[Motion]]) -> list[Samples]:
@@ -149,27 +143,13 @@ def _samples_of_sets(robot: Robot, sets: Sequence[Sequence[Motion]]) -> list[Sam
     ]
 
 
-def _prefix(kind: str, say: Say) -> Say:
-    return lambda text: say(f"{kind} classifier, {text}")
-
-
-def _rows(recognition: Recognition) -> dict[str, Any]:
-    rows: dict[str, Any] = {
-        row: {name: asdict(estimate) for name, estimate in by_name.items()}
-        for row, by_name in recognition.accuracies.items()
-    }
-    real = rows["real_to_real"]["all"]["mean"]
-    diversity = rows["generated_to_real"]["all"]["mean"]
-    return {**rows, "diversity_over_real": diversity / real if real else None}
-
-
 def _confusion(recognition: dict[str, Recognition]) -> dict[str, Any]:
-    some = next(iter(recognition.values()))
     matrices = {
         kind: {row: matrix.round(4).tolist() for row, matrix in r.confusion.items()}
         for kind, r in recognition.items()
     }
-    return {"labels": [str(LABELS[label]) for label in some.labels], **matrices}
+    labels = recognition["linear"].labels
+    return {"labels": [str(LABELS[label]) for label in labels], **matrices}
 
 
 def _two_sample(

@@ -19,13 +19,22 @@ half. Rows of a source are of the same classifier, over the labels of that sourc
 
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.evaluation.classifier import ClassifierConfig, GaitClassifier, predict
+from loco_drake.evaluation.classifier import (
+    LEARNING_RATE,
+    STEPS,
+    ClassifierConfig,
+    GaitClassifier,
+    fit_linear,
+    predict,
+    train_classifier,
+)
 from loco_drake.evaluation.confidence import Estimate, accuracy
 from loco_drake.evaluation.samples import (
     Samples,
@@ -33,12 +42,6 @@ from loco_drake.evaluation.samples import (
     count_per_label,
     join,
     label_weights,
-)
-from loco_drake.evaluation.train_classifier import (
-    LEARNING_RATE,
-    STEPS,
-    fit_linear,
-    train_classifier,
 )
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.motion.gaits import LABELS, SOURCES
@@ -110,6 +113,16 @@ class Recognition:
     labels: Labels
     of_recordings: tuple[Recognizer, ...]
 
+    def rows(self) -> dict[str, Any]:
+        """Returns the accuracies as JSON, and the share that generated motion keeps."""
+        rows: dict[str, Any] = {
+            row: {name: asdict(estimate) for name, estimate in by_name.items()}
+            for row, by_name in self.accuracies.items()
+        }
+        real = rows["real_to_real"]["all"]["mean"]
+        diversity = rows["generated_to_real"]["all"]["mean"]
+        return {**rows, "diversity_over_real": diversity / real if real else None}
+
 
 def recognize(
     fit: Fit,
@@ -132,34 +145,33 @@ def recognize(
     """
     everything = join(generated)
     counts = count_per_label(train)
-    found: dict[str, list[Labels]] = {
-        "real_to_real": [],
-        "real_to_generated": [],
-        "generated_to_real": [],
-        "generated_to_real_matched": [],
-    }
     of_recordings = []
+    runs: list[dict[str, Labels]] = []
     for run, seed in enumerate(seeds):
-        say(f"run {run + 1} of {len(seeds)}: learning from recordings")
+        place = f"run {run + 1} of {len(seeds)}:"
+        say(f"{place} learning from recordings")
         recognizer = fit(train, seed)
         of_recordings.append(recognizer)
-        found["real_to_real"].append(recognizer(validation))
-        found["real_to_generated"].append(recognizer(everything))
-        say(f"run {run + 1} of {len(seeds)}: learning from generated motion")
+        say(f"{place} learning from generated motion")
         own = generated[run % len(generated)]
-        found["generated_to_real"].append(fit(own, seed)(validation))
+        found = {
+            "real_to_real": recognizer(validation),
+            "real_to_generated": recognizer(everything),
+            "generated_to_real": fit(own, seed)(validation),
+        }
         few = choose_per_label(own, counts, np.random.default_rng(seed))
+        matched = found["generated_to_real"]
         if len(few) < len(own):
-            say(f"run {run + 1} of {len(seeds)}: ... of as many trajectories")
-            found["generated_to_real_matched"].append(fit(few, seed)(validation))
-        else:
-            found["generated_to_real_matched"].append(found["generated_to_real"][-1])
+            say(f"{place} ... of as many trajectories")
+            matched = fit(few, seed)(validation)
+        runs.append({**found, "generated_to_real_matched": matched})
     labels = np.unique(validation.labels)
     accuracies, confusion = {}, {}
-    for row, answers in found.items():
+    for row in runs[0]:
+        answers = np.stack([found[row] for found in runs])
         tested = everything if row == "real_to_generated" else validation
-        accuracies[row] = _accuracies(np.stack(answers), tested)
-        confusion[row] = confusion_matrix(np.stack(answers), tested.labels, labels)
+        accuracies[row] = _accuracies(answers, tested)
+        confusion[row] = confusion_matrix(answers, tested.labels, labels)
     return Recognition(accuracies, confusion, labels, tuple(of_recordings))
 
 

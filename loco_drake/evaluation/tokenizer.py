@@ -4,6 +4,11 @@ The figures of a label are those of :mod:`loco_drake.generation.tokenizer_score`
 all frames of its recordings. Those of all labels are roots of the mean of the labels'
 squares: every label weighs the same. The codebook's use is the share of all codes that
 occur in the recordings of both sides of the split and their mirror images.
+
+Tokens as a language of all robots, ``transfer_joint_rmse_rad``: the Go2's motion of a
+recording is encoded as the Go2's and decoded for the A1; what comes out is compared
+with the A1's own retarget of the same recording, joint by joint and frame by frame, RMS
+over all frames and joints.
 """
 
 from collections.abc import Sequence
@@ -11,13 +16,19 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
+from loco_drake.common.determinism import single_thread
 from loco_drake.evaluation.recorded import Recorded
+from loco_drake.evaluation.samples import subject_of
+from loco_drake.generation.features import JOINTS, motion_features
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.tokenizer_score import code_counts, score_tokenizer
 from loco_drake.generation.training_motions import Clip, motion_clip
+from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.motion import Motion
 
 FIGURES = ("joint_rmse_rad", "toe_error_rmse_m")
 NO_RECORDINGS = "No recording of this label is held out."
@@ -77,3 +88,48 @@ def _scores(
     if not labels:
         means["reason"] = "No recording is held out."
     return {"labels": labels, "all": means}
+
+
+def transfer_rmse(
+    tokenizer: Tokenizer, pairs: Sequence[tuple[Motion, Motion]]
+) -> float:
+    """Returns the RMS of the joints' error, in rad, over all pairs.
+
+    Args:
+        tokenizer: knows both robots.
+        pairs: motion to encode, and what it is to become on the other robot; both of
+            the same stretch of a recording. Frames beyond the last whole token are
+            left out.
+    """
+    squares = []
+    for given, wanted in pairs:
+        features = motion_features(get_robot(given.robot), given)
+        size = tokenizer.config.frames_per_token
+        frames = min(len(given), len(wanted)) // size * size
+        source, target = (
+            torch.tensor([tokenizer.config.robots.index(motion.robot)])
+            for motion in (given, wanted)
+        )
+        with torch.inference_mode(), single_thread():
+            batch = torch.tensor(features[None, :frames], dtype=torch.float32)
+            decoded = tokenizer.decode(tokenizer.encode(batch, source), target)
+        joints = decoded[0, :, JOINTS].numpy()
+        squares.append((joints - wanted.joint_positions[:frames]).ravel() ** 2)
+    return float(np.sqrt(np.concatenate(squares).mean()))
+
+
+def pair_up(
+    given: Sequence[Motion], wanted: Sequence[Motion]
+) -> list[tuple[Motion, Motion]]:
+    """Returns the motions of two robots that were made of the same stretches."""
+
+    def stretch(motion: Motion) -> tuple[str, str | None, str | None]:
+        file, frames = (motion.provenance.get(key) for key in ("file", "frames"))
+        return str(motion.label), file, frames
+
+    partners = {stretch(motion): motion for motion in wanted if subject_of(motion)}
+    return [
+        (motion, partners[stretch(motion)])
+        for motion in given
+        if stretch(motion) in partners
+    ]

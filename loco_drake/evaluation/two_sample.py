@@ -16,6 +16,7 @@ from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
+from loco_drake.evaluation.classifier import fit_linear
 from loco_drake.evaluation.confidence import Estimate, accuracy
 from loco_drake.evaluation.samples import (
     Samples,
@@ -23,7 +24,6 @@ from loco_drake.evaluation.samples import (
     count_per_label,
     join,
 )
-from loco_drake.evaluation.train_classifier import fit_linear
 
 Array = NDArray[np.float64]
 

@@ -6,13 +6,14 @@ from loco_drake.common.errors import InputError
 from loco_drake.common.weights import save_weights
 from loco_drake.evaluation.classifier import (
     ClassifierConfig,
+    class_indices,
     embeddings,
     load_classifier,
     predict,
+    train_classifier,
 )
 from loco_drake.evaluation.recognition import TransformerRecognizer, linear_recognizer
 from loco_drake.evaluation.samples import make_samples
-from loco_drake.evaluation.train_classifier import class_indices, train_classifier
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS, parse_label

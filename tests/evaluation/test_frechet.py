@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.linalg import sqrtm
 
-from loco_drake.evaluation.frechet import frechet_distance, moments
+from loco_drake.evaluation.distances import frechet_distance, moments
 
 UNIFORM = np.ones(200)
 

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from loco_drake.evaluation.nearest import nearest_distances, shifted_distances
+from loco_drake.evaluation.distances import nearest_distances, shifted_distances
 from tests.synthetic_motion import synthetic_motion
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.evaluation.transfer import pair_up, transfer_rmse
+from loco_drake.evaluation.tokenizer import pair_up, transfer_rmse
 from loco_drake.generation.features import JOINTS, motion_features
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig
 from loco_drake.models.robots import get_robot

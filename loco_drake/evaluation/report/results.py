@@ -94,7 +94,7 @@ class Figures:
     """
 
     values: dict[str, Any]
-    origin: Path
+    origin: Path = Path()
 
     def part(self, *keys: str) -> "Figures":
         """Returns the object that ``keys`` lead to."""

@@ -5,7 +5,6 @@ from dataclasses import asdict
 from typing import Any
 
 from loco_drake.control.actor import load_actor
-from loco_drake.evaluation.report import tables
 from loco_drake.evaluation.report.content import CONTENT
 from loco_drake.evaluation.report.results import Figures, Results, tracking_name
 from loco_drake.evaluation.report.tables import (
@@ -18,6 +17,7 @@ from loco_drake.evaluation.report.tables import (
     estimate_cell,
     label_table,
     number,
+    recognition_tables,
     robot_title,
 )
 from loco_drake.generation.generator import load_generator
@@ -46,17 +46,15 @@ def all_tables(results: Results) -> dict[str, Any]:
             tokenizer_table(robot, figures)
             for robot, figures in results.of_robots("tokenizer").items()
         ],
+        "recognition": recognition_tables(generation) if generation else None,
+        "realism": realism_table(generation) if generation else None,
         "generation": [
             generation_table(robot, figures) for robot, figures in generation.items()
         ],
-        "transformer": tables.transformer_table(generation) if generation else None,
-        "linear": tables.linear_table(generation) if generation else None,
-        "matched": tables.matched_table(generation) if generation else None,
-        "realism": realism_table(generation) if generation else None,
         "tracking": [
             label_table(
                 _by_gait(robot),
-                [*_COLUMNS["tracking"], *_COLUMNS["tracking_more"]],
+                _COLUMNS["tracking"] + _COLUMNS["tracking_more"],
                 figures,
                 conditions_text(figures),
             )

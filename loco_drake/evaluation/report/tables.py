@@ -1,6 +1,6 @@
 """Tables of the report, as text that a page only has to lay out."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from loco_drake.evaluation.report.content import CONTENT, Column
@@ -10,6 +10,7 @@ from loco_drake.motion.gaits import LABELS
 
 NOTHING = "–"
 NOT_MEASURED = "not measured"  # of what others released
+Theirs = Callable[[str, str], "Cell"]  # what is known, of a source and a comparison
 _TITLES = {"go2": "Go2", "a1": "A1"}
 
 
@@ -114,6 +115,26 @@ def estimate_cell(figures: Figures, *keys: str) -> Cell:
     return figure_cell(read_estimate(figures, *keys))
 
 
+def figures_table(
+    title: str,
+    first: str,
+    columns: Sequence[Column],
+    rows: Mapping[str, Figures],
+    note: str = "",
+) -> Table:
+    """Returns figures by the titles of their rows; a row "all" is a total."""
+    return Table(
+        title,
+        first,
+        tuple(column.title for column in columns),
+        tuple(
+            Row(name, tuple(column_cell(c, own) for c in columns), name == "all")
+            for name, own in rows.items()
+        ),
+        note,
+    )
+
+
 def label_table(
     title: str, columns: Sequence[Column], figures: Figures, note: str = ""
 ) -> Table:
@@ -127,77 +148,64 @@ def label_table(
     """
     found = dict(figures.parts("labels"))
     known = {str(label): found[str(label)] for label in LABELS if str(label) in found}
-    rows = tuple(
-        Row(name, tuple(column_cell(c, part) for c in columns), total=name == "all")
-        for name, part in {**known, "all": figures.part("all")}.items()
-    )
-    return Table(title, "gait", tuple(c.title for c in columns), rows, note)
+    rows = {**known, "all": figures.part("all")}
+    return figures_table(title, "gait", columns, rows, note)
 
 
-def transformer_table(generation: dict[str, Figures]) -> Table:
-    """Returns Table 1 of the paper, a row for each source; figures by robot."""
+def recognition_tables(generation: dict[str, Figures]) -> dict[str, Table]:
+    """Returns what classifiers recognized, figures by robot, as three tables.
 
-    def theirs(source: str, comparison: str) -> Cell:
+    "transformer" is Table 1 of the paper, a row for each source; "linear" the same by a
+    linear classifier, with the paper's clips beside ours; "matched" the diversity that
+    is left when there are no more samples than real.
+    """
+
+    def published(source: str, comparison: str) -> Cell:
         entry = CONTENT.published(source, comparison)
         return figure_cell(Measured(entry.mean, entry.low, entry.high))
 
-    title = "Transformer, share of trajectories recognized"
-    return _table_1(title, "transformer", generation, "paper", theirs)
-
-
-def linear_table(generation: dict[str, Figures]) -> Table:
-    """Returns the same by a linear classifier, with the paper's clips beside ours."""
-
-    def theirs(source: str, comparison: str) -> Cell:
+    def of_clips(source: str, comparison: str) -> Cell:
         known = source == "all"
         return Cell(f"{CONTENT.linear[comparison]:.3f}" if known else NOT_MEASURED)
 
-    title = "Linear classifier on summaries, share of trajectories recognized"
-    return _table_1(title, "linear", generation, "paper's clips", theirs)
+    def matched(figures: Figures, kind: str) -> Cell:
+        row = "generated_to_real_matched"
+        known = row in figures.part("classifiers", kind).values
+        return _recognized(figures, kind, row, "all") if known else Cell(NOTHING)
 
+    def table_1(title: str, kind: str, whose: str, theirs: Theirs) -> Table:
+        def cells(source: str) -> Iterable[Cell]:
+            for comparison in CONTENT.comparisons:
+                yield theirs(source, comparison)
+                for figures in generation.values():
+                    yield _recognized(figures, kind, comparison, source)
 
-def matched_table(generation: dict[str, Figures]) -> Table:
-    """Returns the diversity that is left when there are no more samples than real."""
+        return Table(
+            f"{title}, share of trajectories recognized",
+            "source",
+            (whose, *robots) * len(CONTENT.comparisons),
+            tuple(
+                Row(name, tuple(cells(source)), total=source == "all")
+                for source, name in CONTENT.sources.items()
+            ),
+            groups=tuple(CONTENT.comparisons.values()),
+        )
 
-    def cell(figures: Figures, kind: str) -> Cell:
-        matched = "generated_to_real_matched"
-        known = matched in figures.part("classifiers", kind).values
-        return _recognized(figures, kind, matched, "all") if known else Cell(NOTHING)
-
-    return Table(
-        "Diversity, from as many generated trajectories as there are recorded ones",
-        "classifier",
-        tuple(map(robot_title, generation)),
-        tuple(
-            Row(kind, tuple(cell(figures, kind) for figures in generation.values()))
-            for kind in ("transformer", "linear")
+    robots = tuple(map(robot_title, generation))
+    linear = "Linear classifier on summaries"
+    return {
+        "transformer": table_1("Transformer", "transformer", "paper", published),
+        "linear": table_1(linear, "linear", "paper's clips", of_clips),
+        "matched": Table(
+            "Diversity, from as many generated trajectories as there are recorded ones",
+            "classifier",
+            robots,
+            tuple(
+                Row(kind, tuple(matched(own, kind) for own in generation.values()))
+                for kind in ("transformer", "linear")
+            ),
         ),
-    )
-
-
-def _table_1(
-    title: str,
-    kind: str,
-    generation: dict[str, Figures],
-    whose: str,
-    theirs: Callable[[str, str], Cell],
-) -> Table:
-    def cells(source: str) -> Iterable[Cell]:
-        for comparison in CONTENT.comparisons:
-            yield theirs(source, comparison)
-            for figures in generation.values():
-                yield _recognized(figures, kind, comparison, source)
-
-    return Table(
-        title,
-        "source",
-        (whose, *map(robot_title, generation)) * len(CONTENT.comparisons),
-        tuple(
-            Row(name, tuple(cells(source)), total=source == "all")
-            for source, name in CONTENT.sources.items()
-        ),
-        groups=tuple(CONTENT.comparisons.values()),
-    )
+    }
 
 
 def _recognized(figures: Figures, kind: str, comparison: str, source: str) -> Cell:
