@@ -118,20 +118,19 @@ def _read(
         values = within.numbers(*path, last.removesuffix("[-1]"))
         ended = values[-1] if values else None
         return None if ended is None else Measured(figure.factor * ended)
-    if last == "mean":
-        return read_estimate(within, *path)
-    number = within.part(*path).required(last)
-    return None if number is None else Measured(figure.factor * number)
+    for key in path:
+        if within.values.get(key, "") is None:
+            return None
+        within = within.part(key)
+    return read_measured(within, last, figure.factor)
 
 
-def read_estimate(figures: Figures, *keys: str) -> Measured | None:
-    """Returns the estimate ``{mean, low, high}`` under ``keys``; None if it is null."""
-    *path, last = keys
-    within = figures.part(*path)
-    if within.values.get(last) is None:
+def read_measured(figures: Figures, key: str, factor: float) -> Measured | None:
+    """Returns a figure, None if it is null; a mean with the ends of its interval."""
+    value = figures.required(key)
+    low, high = (
+        figures.required(end) if key == "mean" else None for end in ("low", "high")
+    )
+    if value is None:
         return None
-    found = within.part(last)
-    mean = found.required("mean")
-    if mean is None:
-        return None
-    return Measured(mean, found.required("low"), found.required("high"))
+    return Measured(factor * value, low and factor * low, high and factor * high)

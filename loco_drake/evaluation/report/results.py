@@ -57,9 +57,10 @@ def tracking_name(condition: str, policy: str = "") -> str:
 def _expected() -> Iterator[ResultFile]:
     start = "loco-drake"
     for result in CONTENT.results:
-        if "{robot}" not in result.command:
-            command = f"{start} {result.command}"
-            yield ResultFile(result.name, ROBOTS, command, holds=result.holds)
+        each = [(robot,) for robot in ROBOTS]
+        for robots in each if "{robot}" in result.command else [ROBOTS]:
+            command = f"{start} {result.command.format(robot=robots[0])}"
+            yield ResultFile(result.name, robots, command, holds=result.holds)
     for policy in CONTENT.policies:
         asked = f"--policy {policy.name}" if policy.name else ""
         for robot in policy.robots:
@@ -73,10 +74,6 @@ def _expected() -> Iterator[ResultFile]:
                     " ".join(filter(None, (start, *line))),
                     " ".join(filter(None, (asked, *flags))),
                 )
-    for result in CONTENT.results:
-        for robot in ROBOTS if "{robot}" in result.command else ():
-            command = f"{start} {result.command.format(robot=robot)}"
-            yield ResultFile(result.name, (robot,), command, holds=result.holds)
 
 
 EXPECTED = tuple(_expected())
@@ -134,8 +131,8 @@ class Figures:
         values = within.values.get(last)
         if not isinstance(values, list):
             raise self.damaged(f"{'.'.join(keys)} is no list")
-        named = Figures({str(i): v for i, v in enumerate(values)}, self.origin)
-        return [named.number(str(i)) for i in range(len(values))]
+        named = {str(place): value for place, value in enumerate(values)}
+        return [Figures(named, self.origin).number(place) for place in named]
 
     def text(self, key: str) -> str:
         """Returns a string, empty where there is none."""

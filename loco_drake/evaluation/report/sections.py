@@ -1,6 +1,5 @@
 """The tables of each part of the pipeline, for all robots that have results."""
 
-from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
@@ -14,7 +13,6 @@ from loco_drake.evaluation.report.tables import (
     Row,
     Table,
     column_cell,
-    estimate_cell,
     label_table,
     number,
     recognition_tables,
@@ -27,7 +25,6 @@ from loco_drake.models.shipped import policy_path, pretrained_path
 from loco_drake.motion.motion import FPS
 
 _COLUMNS = CONTENT.columns
-_PARTS = "two_sample_accuracy_of_parts"
 
 
 def all_tables(results: Results) -> dict[str, Any]:
@@ -124,32 +121,11 @@ def _drift(figures: Figures, row: Row) -> Cell:
 def realism_table(robots: dict[str, Figures]) -> Table:
     """Returns what tells generated motion from recordings, robots side by side."""
     rows = []
-
-    def add(title: str, key: str, cells: Iterable[Cell]) -> None:
-        theirs = CONTENT.clips.get(key)
-        shown = NOT_MEASURED if theirs is None else f"{theirs:.3f}"
-        rows.append(Row(title, (Cell(shown), *cells)))
-
-    def add_estimate(title: str, *keys: str) -> None:
-        add(
-            title,
-            keys[-1],
-            (estimate_cell(figures, *keys) for figures in robots.values()),
-        )
-
-    add_estimate("told from recordings, linear (.5 is chance)", "two_sample_accuracy")
-    parts = dict.fromkeys(
-        part
-        for figures in robots.values()
-        for part in (figures.part(_PARTS).values if figures.values.get(_PARTS) else ())
-    )
-    for part in parts:
-        add_estimate(f"… from {part} alone", _PARTS, part)
-    add_estimate("… by a support vector machine", "two_sample_accuracy_kernel")
-    add_estimate("recordings told from others, linear", "two_sample_accuracy_real_real")
     for column in _COLUMNS["realism"]:
+        theirs = CONTENT.clips.get(column.key)
+        shown = NOT_MEASURED if theirs is None else f"{theirs:.3f}"
         cells = (column_cell(column, figures) for figures in robots.values())
-        add(column.title, column.key, cells)
+        rows.append(Row(column.title, (Cell(shown), *cells)))
     columns = ("paper's clips", *map(robot_title, robots))
     return Table("Real or generated? New or copied?", "figure", columns, tuple(rows))
 

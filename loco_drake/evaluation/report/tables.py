@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from loco_drake.evaluation.report.content import CONTENT, Column
-from loco_drake.evaluation.report.goals import Measured, read_estimate
+from loco_drake.evaluation.report.goals import Measured, read_measured
 from loco_drake.evaluation.report.results import Figures
 from loco_drake.motion.gaits import LABELS
 
@@ -94,25 +94,26 @@ def figure_cell(found: Measured | None, digits: int = 3, reason: str = "") -> Ce
     return Cell(number(found.value, digits), note="; ".join(notes))
 
 
-def column_cell(column: Column, figures: Figures) -> Cell:
-    """Returns the entry that figures make in a column."""
+def column_cell(column: Column, figures: Figures, otherwise: str = "") -> Cell:
+    """Returns the entry that figures make in a column.
+
+    Args:
+        column: its key may lead to the mean of an estimate, which has an interval.
+        figures: those of a row.
+        otherwise: why there is nothing, if figures do not say so.
+    """
     *path, last = column.key.split(".")
     part = figures
     for key in path:
         if part.values.get(key) is None:
-            return Cell(NOTHING, reason=figures.reason(last))
+            return Cell(NOTHING, reason=part.reason(key) or otherwise)
         part = part.part(key)
+    if last == "mean":
+        return figure_cell(read_measured(part, last, column.factor), column.digits)
     value = part.number(last)
     if value is None:
-        return Cell(NOTHING, reason=part.reason(last))
+        return Cell(NOTHING, reason=part.reason(last) or otherwise)
     return Cell(number(column.factor * value, column.digits))
-
-
-def estimate_cell(figures: Figures, *keys: str) -> Cell:
-    """Returns the estimate that ``keys`` lead to."""
-    if figures.values.get(keys[0]) is None:
-        return Cell(NOTHING, reason=figures.reason(keys[0]))
-    return figure_cell(read_estimate(figures, *keys))
 
 
 def figures_table(
@@ -168,17 +169,17 @@ def recognition_tables(generation: dict[str, Figures]) -> dict[str, Table]:
         known = source == "all"
         return Cell(f"{CONTENT.linear[comparison]:.3f}" if known else NOT_MEASURED)
 
-    def matched(figures: Figures, kind: str) -> Cell:
-        row = "generated_to_real_matched"
-        known = row in figures.part("classifiers", kind).values
-        return _recognized(figures, kind, row, "all") if known else Cell(NOTHING)
+    def recognized(figures: Figures, *keys: str, otherwise: str = "") -> Cell:
+        column = Column(key=".".join(("classifiers", *keys, "mean")))
+        return column_cell(column, figures, otherwise)
 
     def table_1(title: str, kind: str, whose: str, theirs: Theirs) -> Table:
         def cells(source: str) -> Iterable[Cell]:
             for comparison in CONTENT.comparisons:
                 yield theirs(source, comparison)
-                for figures in generation.values():
-                    yield _recognized(figures, kind, comparison, source)
+                for own in generation.values():
+                    none = "there is no motion of this source"
+                    yield recognized(own, kind, comparison, source, otherwise=none)
 
         return Table(
             f"{title}, share of trajectories recognized",
@@ -201,16 +202,14 @@ def recognition_tables(generation: dict[str, Figures]) -> dict[str, Table]:
             "classifier",
             robots,
             tuple(
-                Row(kind, tuple(matched(own, kind) for own in generation.values()))
+                Row(
+                    kind,
+                    tuple(
+                        recognized(own, kind, "generated_to_real_matched", "all")
+                        for own in generation.values()
+                    ),
+                )
                 for kind in ("transformer", "linear")
             ),
         ),
     }
-
-
-def _recognized(figures: Figures, kind: str, comparison: str, source: str) -> Cell:
-    part = figures.part("classifiers", kind, comparison)
-    if part.values.get(source) is None:
-        reason = figures.reason("classifiers") or "there is no motion of this source"
-        return Cell(NOTHING, reason=reason)
-    return figure_cell(read_estimate(part, source))
