@@ -29,7 +29,7 @@ from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments, select_labels
 from loco_drake.evaluation.dataset_picture import describe, library_figure
 from loco_drake.evaluation.gait_change import change_figure
-from loco_drake.evaluation.rollout import Recorder, dress
+from loco_drake.evaluation.tracking import Recorder, dress
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.ground import AddGround

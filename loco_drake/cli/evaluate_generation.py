@@ -76,13 +76,10 @@ class EvaluateGeneration(Effort, Evaluation):
         else:
             model = load_motion_model(paths["tokenizer"], paths["generator"], name)
             known = known_labels(model, labels)
-        say("Retargeting the recordings")
         recorded = self.retarget(robot)
         if model is not None:
             others = [n for n in model.tokenizer.config.robots if n != name]
-            if others:
-                say(f"Retargeting the recordings to {others[0]}, too")
-                other = self.retarget(get_robot(others[0]))
+            other = self.retarget(get_robot(others[0])) if others else None
             say(f"Generating {', '.join(map(str, known))}")
             generated = generate_for_scoring(model, known, self, self.seed)
         figures, recognition = score_generation(

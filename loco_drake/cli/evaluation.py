@@ -106,6 +106,7 @@ class Evaluation:
         from loco_drake.evaluation.recorded import retarget_recordings
 
         folder = data_dir(self.data_dir)
+        say_of(robot.name)("Retargeting the recordings")
         recorded = retarget_recordings(folder, robot, self.labels, self.workers)
         print_failed(recorded.failed.items())
         return recorded

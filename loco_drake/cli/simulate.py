@@ -70,8 +70,12 @@ class Simulate:
         """Simulates, prints and writes; returns the exit status."""
         from loco_drake.control.plan import PLAN_DT
         from loco_drake.control.state import POSITION
-        from loco_drake.evaluation.rollout import FRAMES_PER_SECOND, Recorder, frame
-        from loco_drake.evaluation.tracking import tracking_metrics
+        from loco_drake.evaluation.tracking import (
+            FRAMES_PER_SECOND,
+            Recorder,
+            frame,
+            tracking_metrics,
+        )
 
         scenario, duration, motion = self._read()
         meshcat = self._start_meshcat()
@@ -181,7 +185,7 @@ class Simulate:
         return scenario, min(duration, motion.duration), motion
 
     def _start_meshcat(self) -> "Meshcat | None":
-        from loco_drake.evaluation.rollout import dress
+        from loco_drake.evaluation.tracking import dress
 
         if not self.meshcat and self.html is None:
             return None

@@ -26,10 +26,11 @@ POSES = 8  # stick figures in a strip
 STRIP_SECONDS = 0.7
 SPACING = 0.75  # m, between them
 
-_TITLES = {
-    "real_to_real": "recordings, by recordings",
-    "real_to_generated": "generated, by recordings",
-    "generated_to_real": "recordings, by generated",
+# Rows of classifiers that have a confusion matrix each: what was told apart by which.
+CONFUSIONS = {
+    "real_to_real": "recorded, by recorded",
+    "real_to_generated": "generated, by recorded",
+    "generated_to_real": "recorded, by generated",
 }
 
 
@@ -50,41 +51,42 @@ def generation_figures(
 
 def confusion_figure(recognition: Recognition, title: str) -> Figure:
     """Returns three confusion matrices: what each gait (row) was taken for."""
-    labels = [str(LABELS[label]) for label in recognition.labels]
     figure = Figure(figsize=(15, 6.6), layout="constrained")
     figure.suptitle(title)
-    columns = figure.subplots(1, len(_TITLES))
-    for place, (axes, (row, what)) in enumerate(
-        zip(columns, _TITLES.items(), strict=True)
-    ):
-        draw_confusion(axes, recognition.confusion[row], labels, names=place == 0)
-        axes.set_title(f"{what}: {recognition.accuracies[row]['all'].mean:.3f}")
+    labels = [str(LABELS[label]) for label in recognition.labels]
+    matrices = {}
+    for row, what in CONFUSIONS.items():
+        mean = recognition.accuracies[row]["all"].mean
+        matrices[f"{what}: {mean:.3f}"] = recognition.confusion[row]
+    draw_confusions(figure, matrices, labels)
     return figure
 
 
-def draw_confusion(
-    axes: Axes, matrix: Array, labels: Sequence[str], *, names: bool
+def draw_confusions(
+    figure: Figure, matrices: Mapping[str, Array], labels: Sequence[str]
 ) -> None:
-    """Draws the shares, shape (labels, labels), of each row that were taken for what.
+    """Draws matrices, shape (labels, labels), side by side in an empty figure.
 
     Args:
-        axes: to draw in.
-        matrix: the shares.
+        figure: to draw in.
+        matrices: by title: the share of each row that was taken for what.
         labels: of rows and columns.
-        names: whether to write the rows' labels, too.
     """
     count = len(labels)
-    for (row, column), share in np.ndenumerate(matrix):
-        if share >= 0.005:
-            color = "#1f9d6b" if row == column else "#d9340d"
-            alpha = 0.25 + 0.75 * share
-            axes.bar(column, 0.92, 0.92, row - 0.46, color=color, alpha=alpha)
-            text = f"{100 * share:.0f}"
-            axes.text(column, row, text, ha="center", va="center", size=6)
-    axes.set(xlim=(-0.6, count - 0.4), ylim=(count - 0.4, -0.6), aspect="equal")
-    axes.set_xticks(range(count), labels, rotation=90, size=7)
-    axes.set_yticks(range(count), labels if names else [""] * count, size=7)
-    axes.set_xlabel("taken for, %", size=8)
+    columns = figure.subplots(1, len(matrices), sharey=True)
+    for axes, (title, matrix) in zip(columns, matrices.items(), strict=True):
+        for (row, column), share in np.ndenumerate(matrix):
+            if share >= 0.005:
+                color = "#1f9d6b" if row == column else "#d9340d"
+                alpha = 0.25 + 0.75 * share
+                axes.bar(column, 0.92, 0.92, row - 0.46, color=color, alpha=alpha)
+                text = f"{100 * share:.0f}"
+                axes.text(column, row, text, ha="center", va="center", size=6)
+        axes.set(xlim=(-0.6, count - 0.4), ylim=(count - 0.4, -0.6), aspect="equal")
+        axes.set_xticks(range(count), labels, rotation=90, size=7)
+        axes.set_yticks(range(count), labels, size=7)
+        axes.set_xlabel("taken for, %", size=8)
+        axes.set_title(title)
 
 
 def code_use_figure(counts: NDArray[np.int64], title: str) -> Figure:

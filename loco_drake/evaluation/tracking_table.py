@@ -29,8 +29,8 @@ from loco_drake.common.errors import InputError
 from loco_drake.common.parallel import map_in_workers
 from loco_drake.control.plan import PLAN_DT, plan_from_motion
 from loco_drake.datasets.segments import Segment
-from loco_drake.evaluation.rollout import Recorder
 from loco_drake.evaluation.tracking import (
+    Recorder,
     effort_metrics,
     slip_speeds,
     tracking_metrics,

@@ -128,7 +128,7 @@ def test_a_bad_model_gets_bad_figures(recordings, weights, tmp_path, capsys):
         "go2-motion.png",
     }
     printed = capsys.readouterr().out
-    assert "go2: accuracy of a linear classifier" in printed
+    assert "Linear classifier on summaries" in printed
     assert "horse-walk" in printed
 
 

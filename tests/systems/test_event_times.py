@@ -1,8 +1,7 @@
 """Events that belong together come at the same time, to the last bit."""
 
 from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD
-from loco_drake.evaluation.rollout import Recorder
-from loco_drake.evaluation.tracking import normalized_return
+from loco_drake.evaluation.tracking import Recorder, normalized_return
 from loco_drake.models.plant import PlantConfig
 from loco_drake.systems.scenario import GeneratedReference, Scenario
 

@@ -12,7 +12,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from loco_drake.evaluation.generation_pictures import draw_confusion, draw_strip
+from loco_drake.evaluation.generation_pictures import (
+    CONFUSIONS,
+    draw_confusions,
+    draw_strip,
+)
 from loco_drake.evaluation.report.content import CONTENT
 from loco_drake.evaluation.report.results import Figures
 from loco_drake.evaluation.report.tables import robot_title
@@ -36,11 +40,6 @@ INK = "#010203"
 FAINT = "#808890"
 
 _TALL = 15.0  # of 100: bars that a number fits into
-_CONFUSIONS = {
-    "real_to_real": "recorded, by recorded",
-    "real_to_generated": "generated, by recorded",
-    "generated_to_real": "recorded, by generated",
-}
 # Lines among the returns: the goals that they are of.
 _AIMS = {
     "aim, mean": "normalized return, mean of all gaits",
@@ -139,7 +138,8 @@ def learning_picture(curves: Mapping[str, Figures]) -> tuple[Figure, str]:
         for source, returns in by_source.items():
             for values in returns:
                 cell.plot(steps, values, color=COLORS[source], lw=0.8, alpha=0.35)
-            mean = _mean(returns)
+            # Of the labels already trained on.
+            mean = np.ma.masked_invalid(returns).mean(axis=0).filled(np.nan)
             cell.plot(steps, mean, color=COLORS[source], lw=2.2, label=source)
             ends.append(f"{robot} {source} {mean[-1]:.0f}")
         cell.axhline(100, color=FAINT, ls="--", lw=1)
@@ -167,13 +167,6 @@ def _curves(figures: Figures) -> tuple[Array, dict[str, Array]]:
             raise figures.damaged(f"learning.return.{label} is no curve of a gait")
         by_source[source].append(values)
     return steps, {name: np.array(found) for name, found in by_source.items() if found}
-
-
-def _mean(values: Array) -> Array:
-    """Returns the mean over labels (axis 0) of those already trained on."""
-    known = ~np.isnan(values)
-    total = np.where(known, values, 0).sum(axis=0)
-    return np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
 
 
 @_as_svg
@@ -240,14 +233,11 @@ def confusion_picture(figures: Figures, kind: str) -> tuple[Figure, str]:
     if not isinstance(labels, list) or labels != [k for k in known if k in labels]:
         raise figures.damaged("confusion.labels are no gaits")
     within = figures.part("confusion", kind)
-    matrices = [within.matrix(key, len(labels)) for key in _CONFUSIONS]
+    matrices = {
+        title: within.matrix(key, len(labels)) for key, title in CONFUSIONS.items()
+    }
     figure = Figure(figsize=(11, 4.7), layout="constrained")
-    columns = figure.subplots(1, len(matrices))
-    for place, (axes, title) in enumerate(
-        zip(columns, _CONFUSIONS.values(), strict=True)
-    ):
-        draw_confusion(axes, matrices[place], labels, names=place == 0)
-        axes.set_title(title)
+    draw_confusions(figure, matrices, labels)
     alt = (
         f"Confusion matrices of the {kind} classifier over {len(labels)} gaits: "
         "what each gait, a row, was taken for."

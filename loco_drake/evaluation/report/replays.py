@@ -11,8 +11,13 @@ from typing import Any
 
 from pydrake.geometry import Meshcat, MeshcatAnimation
 
-from loco_drake.evaluation.rollout import FRAMES_PER_SECOND, Recorder, dress, frame
-from loco_drake.evaluation.tracking import tracking_metrics
+from loco_drake.evaluation.tracking import (
+    FRAMES_PER_SECOND,
+    Recorder,
+    dress,
+    frame,
+    tracking_metrics,
+)
 from loco_drake.models.plant import PlantConfig
 from loco_drake.systems.scenario import GeneratedReference, Scenario, TrainedPolicy
 
