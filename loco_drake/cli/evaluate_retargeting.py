@@ -1,5 +1,6 @@
 """The command ``evaluate retargeting``."""
 
+import time
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -50,12 +51,16 @@ class EvaluateRetargeting(Evaluation):
         robots = {}
         with Progress(console=Console(stderr=True), transient=True) as progress:
             for robot in [load_robot(name) for name in names]:
+                start = time.perf_counter()
                 tracked = progress.track(
                     score_segments(segments, robot, self.workers, variant),
                     total=len(segments),
                     description=f"Retargeting to {robot.name}",
                 )
-                robots[robot.name] = summarize(list(tracked))
+                robots[robot.name] = {
+                    **summarize(list(tracked)),
+                    "wall_clock_s": time.perf_counter() - start,
+                }
         return {"robots": robots, **asdict(variant)}
 
     def show(self, name: str, figures: dict[str, Any]) -> int:

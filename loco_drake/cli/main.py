@@ -14,58 +14,27 @@ from loco_drake.common.determinism import use_one_thread
 from loco_drake.common.errors import InputError, check_choice, one_line
 from loco_drake.common.files import check_writable
 
-# Command: module, class, summary. Modules are imported on demand, so that --help does
-# not import torch and Drake.
+# What each command does.
 _COMMANDS = {
-    "simulate": ("simulate", "Simulate", "simulate a robot that performs a gait"),
-    "generate": ("generate", "Generate", "generate motion and write Motion files"),
-    "retarget": ("retarget", "Retarget", "retarget recordings to a robot"),
-    "data list": ("data", "DataList", "list the sources of motion and their licences"),
-    "data fetch": ("fetch", "DataFetch", "download and check the recordings"),
-    "data inspect": ("data", "DataInspect", "plot one stretch of a recording"),
-    "train tokenizer": (
-        "train_tokenizer",
-        "TrainTokenizer",
-        "train the VQ-VAE that encodes motion",
-    ),
-    "train generator": (
-        "train_generator",
-        "TrainGenerator",
-        "train the GPT that generates tokens",
-    ),
-    "train tracker": (
-        "train_tracker",
-        "TrainTracker",
-        "train the tracking policy with PPO",
-    ),
-    "train classifier": (
-        "train_classifier",
-        "TrainClassifier",
-        "train the transformer that classifies gaits",
-    ),
-    "export": ("export", "Export", "write a policy as ONNX"),
-    "evaluate retargeting": (
-        "evaluate_retargeting",
-        "EvaluateRetargeting",
-        "measure retargeted motion",
-    ),
-    "evaluate tokenizer": (
-        "evaluate_tokenizer",
-        "EvaluateTokenizer",
-        "measure reconstruction by the tokenizer",
-    ),
-    "evaluate generation": (
-        "evaluate_generation",
-        "EvaluateGeneration",
-        "compare generated with recorded motion",
-    ),
-    "evaluate tracking": (
-        "evaluate_tracking",
-        "EvaluateTracking",
-        "measure how well a policy tracks",
-    ),
-    "report": ("report", "Report", "write one HTML page of all results"),
+    "simulate": "simulate a robot that performs a gait",
+    "generate": "generate motion and write Motion files",
+    "retarget": "retarget recordings to a robot",
+    "data list": "list the sources of motion and their licences",
+    "data fetch": "download and check the recordings",
+    "data inspect": "plot one stretch of a recording",
+    "train tokenizer": "train the VQ-VAE that encodes motion",
+    "train generator": "train the GPT that generates tokens",
+    "train tracker": "train the tracking policy with PPO",
+    "train classifier": "train the transformer that classifies gaits",
+    "export": "write a policy as ONNX",
+    "evaluate retargeting": "measure retargeted motion",
+    "evaluate tokenizer": "measure reconstruction by the tokenizer",
+    "evaluate generation": "compare generated with recorded motion",
+    "evaluate tracking": "measure how well a policy tracks",
+    "report": "write one HTML page of all results",
 }
+# Of most commands the module is called like them, "train_tracker".
+_MODULES = {"data list": "data", "data fetch": "fetch", "data inspect": "data"}
 _HELP = ("-h", "--help")
 # Options that name an output. Whether it is writable is checked before the work.
 _OUTPUTS = ("json", "html", "out", "figures")
@@ -96,9 +65,8 @@ def main(arguments: list[str] | None = None) -> int:
             _print_help(members)
             return 0
         name, rest = _split(arguments, members)
-        module, class_name, _ = _COMMANDS[name]
         use_one_thread()
-        command = getattr(import_module(f"loco_drake.cli.{module}"), class_name)
+        command = command_class(name)
         # A filter, since importing Drake resets the level.
         logging.getLogger("drake").addFilter(_is_error)
         prog = f"loco-drake {name}"
@@ -135,6 +103,17 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
 
 
+def command_class(name: str) -> Any:
+    """Returns the class of a command; only now is its module, and all else, imported.
+
+    So ``--help`` need not wait for torch and Drake.
+    """
+    module = import_module(
+        f"loco_drake.cli.{_MODULES.get(name, name.replace(' ', '_'))}"
+    )
+    return getattr(module, name.title().replace(" ", ""))
+
+
 def _is_error(record: logging.LogRecord) -> bool:
     """Returns False for messages about harmless properties of models."""
     return record.levelno >= logging.ERROR
@@ -160,6 +139,6 @@ def _print_help(names: list[str]) -> None:
     console.print("loco-drake: learn quadruped motion and simulate it in Drake\n")
     table = Table(box=None, show_header=False, padding=(0, 2))
     for name in names:
-        table.add_row(f"loco-drake {name}", _COMMANDS[name][2])
+        table.add_row(f"loco-drake {name}", _COMMANDS[name])
     console.print(table)
     console.print("\nloco-drake COMMAND --help lists the options of a command.")

@@ -49,15 +49,16 @@ class TrainClassifier(LoopSettings):
         )
         from loco_drake.evaluation.confidence import accuracy
         from loco_drake.evaluation.recorded import load_recorded
-        from loco_drake.evaluation.samples import SECONDS, label_weights, make_samples
-        from loco_drake.retargeting.trajectories import trajectories
+        from loco_drake.evaluation.samples import (
+            SECONDS,
+            cut,
+            label_weights,
+            make_samples,
+        )
 
         check_folder(self.out, f"{self.NAME}.safetensors", self.resume)
         robot, recorded = load_recorded(self.motions)
-        train, validation = (
-            [part for motion in side for part in trajectories(motion)]
-            for side in (recorded.train, recorded.validation)
-        )
+        train, validation = cut(recorded.train), cut(recorded.validation)
         present = {motion.label for motion in train}
         labels = tuple(str(label) for label in LABELS if label in present)
         if len(labels) < 2:

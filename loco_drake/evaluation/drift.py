@@ -29,14 +29,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import pdist
 
 from loco_drake.common.rotations import yaw_of
 from loco_drake.evaluation.motion_scores import mean_speed
+from loco_drake.evaluation.samples import cut
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gait_timing import motion_track, stride_period
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.quality import stance_slip_median, toe_trajectories
-from loco_drake.retargeting.trajectories import trajectories
 
 Array = NDArray[np.float64]
 
@@ -65,13 +66,9 @@ def drift(robot: Robot, motions: Sequence[Motion]) -> dict[str, Any]:
         two motions have in their first window, such as a stride period of robots that
         stand, is left out.
     """
-    windows = [round(WINDOW * motion.fps) for motion in motions]
-    first = _table(
-        robot, [m.slice(0, n) for m, n in zip(motions, windows, strict=True)]
-    )
-    last = _table(
-        robot,
-        [m.slice(len(m) - n, len(m)) for m, n in zip(motions, windows, strict=True)],
+    first, last = (
+        _table(robot, side)
+        for side in zip(*(_ends(motion) for motion in motions), strict=True)
     )
     result = {}
     for column, (name, resolution) in enumerate(RESOLUTION.items()):
@@ -80,8 +77,7 @@ def drift(robot: Robot, motions: Sequence[Motion]) -> dict[str, Any]:
         if len(begin) < 2:
             continue
         lost = np.isnan(end)
-        apart = np.abs(begin[:, None] - begin)[np.triu_indices(len(begin), k=1)]
-        tolerance = max(resolution, float(np.quantile(apart, 0.95)))
+        tolerance = _tolerance(begin, resolution)
         change = float(np.median(np.abs(np.where(lost, 0.0, end) - begin)))
         result[name] = {
             "first": float(begin.mean()),
@@ -108,28 +104,36 @@ def beyond_recorded(
         ``height_over_recorded``. The ratios are 1 or less if there is no more of it
         than in recordings.
     """
-    window = round(WINDOW * motions[0].fps)
-    ends = [m.slice(len(m) - window, len(m)) for m in motions]
-    cuts = [part for motion in recorded for part in trajectories(motion)]
+    begins, ends = zip(*(_ends(motion) for motion in motions), strict=True)
+    cuts = cut(recorded)
     turn, usual = (
         float(np.sqrt(np.mean([_turn(part) ** 2 for part in side])))
-        for side in ([part for end in ends for part in trajectories(end)], cuts)
+        for side in (cut(ends), cuts)
     )
     least = RESOLUTION["turn_rate_radps"] * cuts[0].duration
     first, last, heights = (
         np.array([m.base_position[:, 2].mean() for m in side])
-        for side in ([m.slice(0, window) for m in motions], ends, cuts)
+        for side in (begins, ends, cuts)
     )
-    apart = np.abs(heights[:, None] - heights)[np.triu_indices(len(heights), k=1)]
-    tolerance = max(
-        RESOLUTION["height_m"], float(np.quantile(apart, 0.95)) if len(apart) else 0.0
-    )
+    tolerance = _tolerance(heights, RESOLUTION["height_m"])
     return {
         "turn_2s_rad": turn,
         "recorded_turn_2s_rad": usual,
         "turn_over_recorded": turn / max(usual, least),
         "height_over_recorded": float(np.median(np.abs(last - first))) / tolerance,
     }
+
+
+def _ends(motion: Motion) -> tuple[Motion, Motion]:
+    """Returns the first and the last WINDOW seconds."""
+    window = round(WINDOW * motion.fps)
+    return motion.slice(0, window), motion.slice(len(motion) - window, len(motion))
+
+
+def _tolerance(values: Array, resolution: float) -> float:
+    """Returns what 95 % of pairs of values differ by at most, or the resolution."""
+    apart = pdist(values[:, None], "cityblock")
+    return max(resolution, float(np.quantile(apart, 0.95)) if len(apart) else 0.0)
 
 
 def _turn(motion: Motion) -> float:
@@ -149,10 +153,8 @@ def worst(drifts: dict[str, dict[str, Any]]) -> dict[str, Any] | None:
         for label, by_name in drifts.items()
         for name, figures in by_name.items()
     ]
-    if not found:
-        return None
-    value, label, name = max(found)
-    return {"drift": value, "label": label, "figure": name}
+    keys = ("drift", "label", "figure")
+    return dict(zip(keys, max(found), strict=True)) if found else None
 
 
 def _table(robot: Robot, windows: Sequence[Motion]) -> Array:

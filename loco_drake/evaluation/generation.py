@@ -27,6 +27,7 @@ from loco_drake.evaluation.samples import (
     FRAMES,
     SUMMARY,
     Samples,
+    cut,
     join,
     label_weights,
     make_samples,
@@ -35,7 +36,6 @@ from loco_drake.evaluation.two_sample import FOLDS, two_sample_accuracy
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import Motion
-from loco_drake.retargeting.trajectories import trajectories
 
 Array = NDArray[np.float64]
 
@@ -89,10 +89,7 @@ def score_generation(
         [m for m in side if str(m.label) in names]
         for side in (recorded.train, recorded.validation, *generated.sets)
     )
-    cut_train, cut_validation = (
-        [part for motion in side for part in trajectories(motion)]
-        for side in (train, validation)
-    )
+    cut_train, cut_validation = cut(train), cut(validation)
     seeds = list(range(seed, seed + effort.seeds))
     fits: dict[str, Fit] = {
         "transformer": partial(TransformerRecognizer, steps=effort.steps),
@@ -257,8 +254,9 @@ def _by_label(robot: Robot, recorded: Recorded, generated: Generated) -> dict[st
     figures = {}
     for name, of_generated in measured.items():
         stretches = recorded.of(name)
-        cuts = [part for motion in stretches for part in trajectories(motion)]
-        of_recordings = measure(robot, cuts or stretches) if stretches else None
+        of_recordings = (
+            measure(robot, cut(stretches) or stretches) if stretches else None
+        )
         figures[name] = compare(of_generated, of_recordings)
     ordered = [str(label) for label in LABELS if str(label) in figures]
     return {

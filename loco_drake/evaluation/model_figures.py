@@ -13,13 +13,12 @@ from loco_drake.evaluation.effort import Effort
 from loco_drake.evaluation.generation import Generated
 from loco_drake.evaluation.motion_scores import NULL_FIGURES
 from loco_drake.evaluation.recorded import Recorded
-from loco_drake.evaluation.samples import FRAMES, SECONDS
+from loco_drake.evaluation.samples import FRAMES, SECONDS, cut
 from loco_drake.evaluation.tokenizer import pair_up, transfer_rmse
 from loco_drake.generation.generate import generate_motion, generate_motions
 from loco_drake.generation.motion_model import MotionModel
 from loco_drake.motion.gaits import GaitLabel, parse_label
 from loco_drake.motion.motion import Motion
-from loco_drake.retargeting.trajectories import trajectories
 
 TIMED_SECONDS = 10.0
 NOT_TRAINED = "The generator was not trained on this label."
@@ -68,7 +67,7 @@ def cut_for_scoring(motions: Sequence[Motion]) -> Generated:
     Raises:
         InputError: if no motion is as long as a trajectory.
     """
-    cuts = [part for motion in motions for part in trajectories(motion)]
+    cuts = cut(motions)
     if not cuts:
         raise InputError(f"No motion to score is {SECONDS:g} s long or longer.")
     long: dict[str, list[Motion]] = {}

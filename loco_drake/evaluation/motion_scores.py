@@ -93,14 +93,10 @@ def mean_speed(robot: Robot, motion: Motion) -> float:
 
 def compare(generated: Measured, recorded: Measured | None) -> dict[str, Any]:
     """Returns the figures of a label; those that need recordings may be None."""
-    slip = generated.slip_speeds
-    figures: dict[str, Any] = {
-        "stance_slip_median_mps": float(np.median(slip)) if len(slip) else None,
-        "penetration_max_m": generated.penetration,
-        "jerk_ratio": None,
-        "speed_error_mps": None,
+    figures = {
+        **NULL_FIGURES,
         "speed_distance_mps": None,
-        "speed_mps": float(generated.speeds.mean()),
+        **_of_one_side(generated),
     }
     if recorded is None:
         return {**figures, "reason": "There are no recordings of this label."}
@@ -111,13 +107,20 @@ def compare(generated: Measured, recorded: Measured | None) -> dict[str, Any]:
     figures["speed_distance_mps"] = float(
         wasserstein_distance(generated.speeds, recorded.speeds)
     )
-    slip = recorded.slip_speeds
-    figures["recorded"] = {
-        "stance_slip_median_mps": float(np.median(slip)) if len(slip) else None,
-        "penetration_max_m": recorded.penetration,
-        "speed_mps": float(recorded.speeds.mean()),
+    return {**figures, "recorded": _of_one_side(recorded)}
+
+
+def _of_one_side(measured: Measured) -> dict[str, Any]:
+    return {
+        "stance_slip_median_mps": median(measured.slip_speeds),
+        "penetration_max_m": measured.penetration,
+        "speed_mps": float(measured.speeds.mean()),
     }
-    return figures
+
+
+def median(values: Array) -> float | None:
+    """Returns the median; None of no values."""
+    return float(np.median(values)) if len(values) else None
 
 
 def overall(
@@ -137,7 +140,7 @@ def overall(
     jerk = values("jerk_ratio")
     error, distance = values("speed_error_mps"), values("speed_distance_mps")
     return {
-        "stance_slip_median_mps": float(np.median(slips)) if len(slips) else None,
+        "stance_slip_median_mps": median(slips),
         "penetration_max_m": max((m.penetration for m in measured), default=None),
         "jerk_ratio": float(gmean(jerk)) if jerk else None,
         "speed_error_mps": float(np.mean(error)) if error else None,

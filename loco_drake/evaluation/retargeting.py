@@ -21,8 +21,9 @@ frames_per_second        frames of motion over seconds of computing in one proce
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from numpy.typing import NDArray
 
 from loco_drake.common.parallel import map_in_workers
 from loco_drake.datasets.segments import Segment
+from loco_drake.evaluation.motion_scores import median
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.models.robot_files import load_robot
 from loco_drake.motion.gait_timing import (
@@ -240,7 +242,7 @@ def figures(clips: Sequence[ClipScore]) -> dict[str, Any]:
         return max((getattr(report, key) for report in reports), default=None)
 
     result: dict[str, Any] = {
-        "stance_slip_median_mps": float(np.median(steps)) if len(steps) else None,
+        "stance_slip_median_mps": median(steps),
         "penetration_max_m": worst("penetration_max_m"),
         "joint_limit_violations": sum(r.joint_limit_violations for r in reports),
         "joint_speed_ratio_max": worst("joint_speed_ratio_max"),
@@ -269,14 +271,15 @@ def figures(clips: Sequence[ClipScore]) -> dict[str, Any]:
 
 def _worst_clips(clips: Sequence[ClipScore]) -> dict[str, dict[str, Any]]:
     """Returns the highest value of each figure, and the name of its clip."""
-    worst: dict[str, dict[str, Any]] = {}
-    for clip in clips:
-        own: dict[str, float | None] = {
-            key: getattr(clip.report, key) for key in _WORST_OF_REPORT
-        }
-        if clip.fidelity is not None:
-            own.update(asdict(clip.fidelity))
-        for key, value in own.items():
-            if value is not None and (key not in worst or value > worst[key]["value"]):
-                worst[key] = {"value": value, "clip": clip.segment.name}
+    worst = {}
+    for key in (*_WORST_OF_REPORT, *_FIDELITY):
+        values = [
+            (value, clip.segment.name)
+            for clip in clips
+            for part in (clip.report, clip.fidelity)
+            if (value := getattr(part, key, None)) is not None
+        ]
+        if values:
+            value, name = max(values, key=itemgetter(0))
+            worst[key] = {"value": value, "clip": name}
     return worst

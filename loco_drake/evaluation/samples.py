@@ -19,7 +19,7 @@ Mirror image
     each: to prefer a side is no gait of its own.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +34,7 @@ from loco_drake.generation.features import (
 )
 from loco_drake.models.robots import Robot
 from loco_drake.motion.motion import FPS, Motion
+from loco_drake.retargeting.trajectories import trajectories
 
 Array = NDArray[np.float64]
 
@@ -80,34 +81,29 @@ class Samples:
 
     def __getitem__(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> "Samples":
         """Returns those that a mask or indices choose."""
-        return Samples(
-            self.channels[index],
-            self.summaries[index],
-            self.labels[index],
-            self.subjects[index],
-        )
+        return Samples(*(column[index] for column in vars(self).values()))
 
 
-def make_samples(robot: Robot, trajectories: Sequence[Motion]) -> Samples:
+def make_samples(robot: Robot, motions: Sequence[Motion]) -> Samples:
     """Returns trajectories as samples; frames after the first FRAMES are left out.
 
     Motions without a subject in their provenance are subjects of their own.
 
     Args:
         robot: that of the motions.
-        trajectories: at least FRAMES frames each, of one of the fifteen labels.
+        motions: at least FRAMES frames each, of one of the fifteen labels.
     """
-    channels = np.empty((len(trajectories), 2, FRAMES, CHANNELS))
-    for i, motion in enumerate(trajectories):
+    channels = np.empty((len(motions), 2, FRAMES, CHANNELS))
+    for i, motion in enumerate(motions):
         for side, variant in enumerate((motion, motion.mirrored())):
             features = motion_features(robot, variant.slice(0, FRAMES))
             channels[i, side] = features[:, :CHANNELS]
     return Samples(
         channels=channels,
         summaries=summarize(channels),
-        labels=np.array([m.label.index for m in trajectories], dtype=np.int64),
+        labels=np.array([m.label.index for m in motions], dtype=np.int64),
         subjects=np.array(
-            [subject_of(m) or f"motion {i}" for i, m in enumerate(trajectories)],
+            [subject_of(m) or f"motion {i}" for i, m in enumerate(motions)],
             dtype=np.str_,
         ),
     )
@@ -120,14 +116,15 @@ def subject_of(motion: Motion) -> str | None:
     return f"{motion.source}-{name}" if name else None
 
 
+def cut(motions: Iterable[Motion]) -> list[Motion]:
+    """Returns all trajectories of motions, in their order."""
+    return [part for motion in motions for part in trajectories(motion)]
+
+
 def join(parts: Sequence[Samples]) -> Samples:
     """Returns all samples of ``parts``, in their order."""
-    return Samples(
-        np.concatenate([part.channels for part in parts]),
-        np.concatenate([part.summaries for part in parts]),
-        np.concatenate([part.labels for part in parts]),
-        np.concatenate([part.subjects for part in parts]),
-    )
+    columns = zip(*(vars(part).values() for part in parts), strict=True)
+    return Samples(*map(np.concatenate, columns))
 
 
 def summarize(channels: Array) -> Array:

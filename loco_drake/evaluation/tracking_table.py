@@ -29,6 +29,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.common.parallel import map_in_workers
 from loco_drake.control.plan import PLAN_DT, plan_from_motion
 from loco_drake.datasets.segments import Segment
+from loco_drake.evaluation.motion_scores import median
 from loco_drake.evaluation.tracking import (
     Recorder,
     effort_metrics,
@@ -211,7 +212,7 @@ def figures(episodes: Sequence[Episode]) -> dict[str, Any]:
     for name in _POOLED:
         squares = values(name) ** 2
         result[name] = float(np.sqrt(squares @ samples / samples.sum()))
-    result["stance_slip_median_mps"] = float(np.median(slip)) if len(slip) else None
+    result["stance_slip_median_mps"] = median(slip)
     for name in _MEANS:
         result[name] = float(values(name).mean())
     result["episodes"] = len(episodes)

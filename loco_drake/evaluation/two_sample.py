@@ -7,6 +7,7 @@ images, are in one fold.
 """
 
 from collections.abc import Callable
+from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -76,11 +77,8 @@ def two_sample_accuracy(
     estimates = [
         accuracy(right[None], weights, subjects) for right, weights, subjects in runs
     ]
-    return Estimate(
-        mean=float(np.mean([e.mean for e in estimates])),
-        low=float(np.mean([e.low for e in estimates])),
-        high=float(np.mean([e.high for e in estimates])),
-    )
+    columns = zip(*map(astuple, estimates), strict=True)
+    return Estimate(*(float(np.mean(column)) for column in columns))
 
 
 def _cross_validate(

@@ -2,12 +2,11 @@
 
 import json
 import shlex
-from importlib import import_module
 
 import pytest
 import tyro
 
-from loco_drake.cli.main import _COMMANDS
+from loco_drake.cli.main import command_class
 from loco_drake.evaluation.report.results import EXPECTED, commands, load_results
 from tests.report_results import tokenizer, tracking, write_results
 
@@ -57,9 +56,9 @@ def test_other_policies_and_worlds_are_in_the_command(tmp_path):
 def test_commands_are_of_this_command_line(file):
     program, first, second, *options = shlex.split(file.command)
     assert program == "loco-drake"
-    module, class_name, _ = _COMMANDS[f"{first} {second}"]
-    command = getattr(import_module(f"loco_drake.cli.{module}"), class_name)
-    made = tyro.cli(command, args=[*options, "--json", file.path])
+    made = tyro.cli(
+        command_class(f"{first} {second}"), args=[*options, "--json", file.path]
+    )
     assert str(made.json) == file.path
     # The robot of a training is that of its environment.
     of = made.environment if hasattr(made, "environment") else made
