@@ -33,25 +33,15 @@ LEARNING_RATE = 1e-3
 
 @dataclass(frozen=True)
 class ClassifierConfig:
-    """What is needed to build a :class:`GaitClassifier`.
+    """What is needed to build a :class:`GaitClassifier`."""
 
-    Attributes:
-        labels: names of the gait labels that it tells apart.
-        frames_per_patch: frames that are put side by side as one step of time.
-        width: channels.
-        layers: transformer layers.
-        heads: attention heads.
-        embedding: channels of the last layer but one.
-        dropout: probability, while training.
-    """
-
-    labels: tuple[str, ...]
-    frames_per_patch: int = 5
-    width: int = 64
-    layers: int = 2
-    heads: int = 4
-    embedding: int = 32
-    dropout: float = 0.1
+    labels: tuple[str, ...]  # names of the gait labels that it tells apart
+    frames_per_patch: int = 5  # frames that are put side by side as one step of time
+    width: int = 64  # channels
+    layers: int = 2  # transformer layers
+    heads: int = 4  # attention heads
+    embedding: int = 32  # channels of the last layer but one
+    dropout: float = 0.1  # probability, while training
 
 
 class GaitClassifier(nn.Module):

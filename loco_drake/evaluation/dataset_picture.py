@@ -34,25 +34,16 @@ _STRIDES = 2  # Solo8's clips hold few
 
 @dataclass(frozen=True)
 class MotionPoint:
-    """What the picture shows of one motion.
+    """What the picture shows of one motion."""
 
-    Attributes:
-        label: what it does.
-        side: of the split.
-        seconds: its length.
-        speed: mean horizontal speed of the trunk in m/s.
-        stride_period: s, None with less than two strides.
-        duty_factor: mean of the feet, None with less than two strides.
-        embedding: mean and standard deviation of each feature
-            (:mod:`loco_drake.generation.features`) in every 2 s, shape (N, 44).
-    """
-
-    label: GaitLabel
-    side: str
-    seconds: float
-    speed: float
-    stride_period: float | None
-    duty_factor: float | None
+    label: GaitLabel  # what it does
+    side: str  # of the split
+    seconds: float  # its length
+    speed: float  # mean horizontal speed of the trunk in m/s
+    stride_period: float | None  # s, None with less than two strides
+    duty_factor: float | None  # mean of the feet, None with less than two strides
+    # Mean and standard deviation of each feature (loco_drake.generation.features) in
+    # every 2 s, shape (N, 44).
     embedding: Array
 
 

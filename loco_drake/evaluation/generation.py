@@ -42,14 +42,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Generated:
-    """Motion to be scored.
+    """Motion to be scored."""
 
-    Attributes:
-        sets: trajectories of 2 s, drawn several times over.
-        long: motions of a minute by label, for the drift; may lack labels.
-    """
-
+    # Trajectories of 2 s, drawn several times over.
     sets: tuple[tuple[Motion, ...], ...]
+    # Motions of a minute by label, for the drift; may lack labels.
     long: dict[str, list[Motion]]
 
 

@@ -47,19 +47,13 @@ NULL_FIGURES: dict[str, Any] = {
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What several motions of a label measure.
+    """What several motions of a label measure."""
 
-    Attributes:
-        slip_speeds: of each step of each toe in stance, m/s, shape (N,).
-        penetration: deepest below the ground, m.
-        jerk: RMS of the joints' jerk, rad/s^3; None if all motions are too short.
-        speeds: mean speed of each motion along its heading, m/s, shape (M,).
-    """
-
-    slip_speeds: Array
-    penetration: float
+    slip_speeds: Array  # of each step of each toe in stance, m/s, shape (N,)
+    penetration: float  # deepest below the ground, m
+    # RMS of the joints' jerk, rad/s^3; None if all motions are too short.
     jerk: float | None
-    speeds: Array
+    speeds: Array  # mean speed of each motion along its heading, m/s, shape (M,)
 
 
 def measure(robot: Robot, motions: Sequence[Motion]) -> Measured:

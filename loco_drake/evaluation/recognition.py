@@ -98,19 +98,15 @@ class TransformerRecognizer:
 
 @dataclass(frozen=True, eq=False)
 class Recognition:
-    """How well one kind of classifier did.
+    """How well one kind of classifier did."""
 
-    Attributes:
-        accuracies: by row of the table above, then by "all" or source.
-        confusion: by row, how often (share) each label was taken for which: shape
-            (labels, labels), rows are the truth.
-        labels: those of the rows and columns, index into LABELS.
-        of_recordings: the classifiers that were trained on recordings, one a seed.
-    """
-
+    # By row of the table above, then by "all" or source.
     accuracies: dict[str, dict[str, Estimate]]
+    # By row, how often (share) each label was taken for which: shape (labels, labels),
+    # rows are the truth.
     confusion: dict[str, Array]
-    labels: Labels
+    labels: Labels  # those of the rows and columns, index into LABELS
+    # The classifiers that were trained on recordings, one a seed.
     of_recordings: tuple[Recognizer, ...]
 
     def rows(self) -> dict[str, Any]:

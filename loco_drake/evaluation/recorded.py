@@ -19,16 +19,11 @@ from loco_drake.retargeting.batch import SegmentRetargeter
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """Retargeted stretches of recordings; no subject is on both sides.
+    """Retargeted stretches of recordings; no subject is on both sides."""
 
-    Attributes:
-        train: what models learn from.
-        validation: what they have not seen.
-        failed: stretches that could not be retargeted, and why.
-    """
-
-    train: tuple[Motion, ...]
-    validation: tuple[Motion, ...]
+    train: tuple[Motion, ...]  # what models learn from
+    validation: tuple[Motion, ...]  # what they have not seen
+    # Stretches that could not be retargeted, and why.
     failed: dict[str, str] = field(default_factory=dict)
 
     def of(self, label: str) -> list[Motion]:

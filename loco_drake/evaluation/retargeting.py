@@ -66,19 +66,14 @@ _ROBOT_STRIDES = 2
 
 @dataclass(frozen=True)
 class GaitFidelity:
-    """Errors of a robot's rhythm; 0 is perfect.
+    """Errors of a robot's rhythm; 0 is perfect."""
 
-    Attributes:
-        stride_period_error: ``|T_robot / T_source - 1|``.
-        phase_lag_error: the largest error of the lag of one toe behind another, over
-            the six pairs of toes; a share of the stride, around the circle, so at most
-            .5. So no toe has a special part, and one wrong toe is one error.
-        duty_factor_error: mean over the toes of the absolute error.
-    """
-
-    stride_period_error: float
+    stride_period_error: float  # |T_robot / T_source - 1|
+    # The largest error of the lag of one toe behind another, over the six pairs of
+    # toes; a share of the stride, around the circle, so at most .5. So no toe has a
+    # special part, and one wrong toe is one error.
     phase_lag_error: float
-    duty_factor_error: float
+    duty_factor_error: float  # mean over the toes of the absolute error
 
 
 # Of a robot that has no rhythm, or fewer than two strides, where the animal has three.
@@ -119,19 +114,12 @@ def timing_errors(source: GaitTiming, robot: GaitTiming) -> GaitFidelity:
 
 @dataclass(frozen=True)
 class ClipScore:
-    """The figures of one clip.
+    """The figures of one clip."""
 
-    Attributes:
-        segment: the stretch of a recording.
-        report: what retargeting says.
-        slip_speeds: of each step of each toe in stance, m/s, shape (N,).
-        fidelity: None if there are fewer than three strides.
-    """
-
-    segment: Segment
-    report: RetargetReport
-    slip_speeds: Array
-    fidelity: GaitFidelity | None
+    segment: Segment  # the stretch of a recording
+    report: RetargetReport  # what retargeting says
+    slip_speeds: Array  # of each step of each toe in stance, m/s, shape (N,)
+    fidelity: GaitFidelity | None  # None if there are fewer than three strides
 
 
 @dataclass(frozen=True)

@@ -61,19 +61,13 @@ RESOLUTION[SUMMARY["correlation"]] = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Trajectories of FRAMES frames, each with its mirror image.
+    """Trajectories of FRAMES frames, each with its mirror image."""
 
-    Attributes:
-        channels: shape (N, 2, FRAMES, CHANNELS); mirror images come second.
-        summaries: shape (N, 2, SUMMARY_SIZE).
-        labels: index into gaits.LABELS, shape (N,).
-        subjects: who or what was recorded, see :func:`subject_of`, shape (N,);
-            trajectories of one subject are not independent.
-    """
-
-    channels: Array
-    summaries: Array
-    labels: NDArray[np.int64]
+    channels: Array  # shape (N, 2, FRAMES, CHANNELS); mirror images come second
+    summaries: Array  # shape (N, 2, SUMMARY_SIZE)
+    labels: NDArray[np.int64]  # index into gaits.LABELS, shape (N,)
+    # Who or what was recorded, see subject_of, shape (N,); trajectories of one subject
+    # are not independent.
     subjects: NDArray[np.str_]
 
     def __len__(self) -> int:

@@ -56,25 +56,15 @@ _LOGGED = ("state", "plan_state", "path_time", "desired_state", "reward_terms")
 
 @dataclass(frozen=True)
 class Rollout:
-    """What a simulation left.
+    """What a simulation left."""
 
-    Attributes:
-        state: the plant's [q, v] at each sample, shape (N + 1, 37).
-        plan_state: the same of the plan.
-        path_time: seconds of unsmoothed motion that have passed, shape (N + 1,).
-        desired_joints: set-points of the PD in rad, shape (N + 1, 12).
-        reward: of each sample, shape (N + 1,); that of the first is not counted.
-        steps: how many steps were to be made; more than N if the robot fell.
-        fell: whether it did.
-    """
-
-    state: Array
-    plan_state: Array
-    path_time: Array
-    desired_joints: Array
-    reward: Array
-    steps: int
-    fell: bool
+    state: Array  # the plant's [q, v] at each sample, shape (N + 1, 37)
+    plan_state: Array  # the same of the plan
+    path_time: Array  # seconds of unsmoothed motion that have passed, shape (N + 1,)
+    desired_joints: Array  # set-points of the PD in rad, shape (N + 1, 12)
+    reward: Array  # of each sample, shape (N + 1,); that of the first is not counted
+    steps: int  # how many steps were to be made; more than N if the robot fell
+    fell: bool  # whether it did
 
 
 class Recorder:

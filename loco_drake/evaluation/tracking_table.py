@@ -54,40 +54,25 @@ _MEANS = (
 
 @dataclass(frozen=True)
 class Trial:
-    """One episode to simulate.
+    """One episode to simulate."""
 
-    Attributes:
-        label: the gait.
-        seed: of the generator; or which of the segments it is.
-        duration: s; of a recorded reference at most its length.
-        segment: the recording to follow; None to follow the generator.
-    """
-
-    label: str
-    seed: int
-    duration: float
+    label: str  # the gait
+    seed: int  # of the generator; or which of the segments it is
+    duration: float  # s; of a recorded reference at most its length
+    # The recording to follow; None to follow the generator.
     segment: Segment | None = None
 
 
 @dataclass(frozen=True)
 class Episode:
-    """What came of a trial.
-
-    Attributes:
-        trial: the trial.
-        figures: of the episode, by name.
-        slip: speeds of the toes in stance, m/s, shape (M,).
-        samples: how many were simulated.
-        fell: whether the robot did.
-        wall: seconds spent inside AdvanceTo.
-    """
+    """What came of a trial."""
 
     trial: Trial
-    figures: dict[str, float]
-    slip: NDArray[np.float64]
-    samples: int
-    fell: bool
-    wall: float
+    figures: dict[str, float]  # of the episode, by name
+    slip: NDArray[np.float64]  # speeds of the toes in stance, m/s, shape (M,)
+    samples: int  # how many were simulated
+    fell: bool  # whether the robot did
+    wall: float  # seconds spent inside AdvanceTo
 
 
 class _Runner:

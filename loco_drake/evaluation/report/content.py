@@ -52,27 +52,16 @@ class Price(Figure):
 
 @dataclass
 class Goal:
-    """A number to reach.
+    """A number to reach."""
 
-    Attributes:
-        title: what is measured.
-        unit: of the figures, for people.
-        known: the paper's figure or the best known, for people.
-        aim: what is to be reached.
-        dream: beyond the aim.
-        figure: what is measured.
-        price: what it was bought with.
-        digits: of figures, after the point.
-    """
-
-    title: str = ""
-    unit: str = ""
-    known: str = ""
-    aim: Bound = field(default_factory=Bound)
-    dream: Bound | None = None
-    figure: Figure = field(default_factory=Figure)
-    price: Price | None = None
-    digits: int = 3
+    title: str = ""  # what is measured
+    unit: str = ""  # of the figures, for people
+    known: str = ""  # the paper's figure or the best known, for people
+    aim: Bound = field(default_factory=Bound)  # what is to be reached
+    dream: Bound | None = None  # beyond the aim
+    figure: Figure = field(default_factory=Figure)  # what is measured
+    price: Price | None = None  # what it was bought with
+    digits: int = 3  # of figures, after the point
 
 
 @dataclass

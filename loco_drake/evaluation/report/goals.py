@@ -12,21 +12,14 @@ MET, BEST, MISSED, UNKNOWN = "met", "dream met", "missed", "not measured"
 
 @dataclass(frozen=True)
 class Measured:
-    """A measured figure, in the unit of its goal.
-
-    Attributes:
-        value: the figure.
-        low: of its 95 % interval, if there is one.
-        high: of the same.
-        notes: what it was bought with, or where it was found, in words.
-        paid: False if the price is above what the goal allows.
-    """
+    """A measured figure, in the unit of its goal."""
 
     value: float
-    low: float | None = None
-    high: float | None = None
+    low: float | None = None  # of its 95 % interval, if there is one
+    high: float | None = None  # of the same
+    # What it was bought with, or where it was found, in words.
     notes: tuple[str, ...] = ()
-    paid: bool = True
+    paid: bool = True  # False if the price is above what the goal allows
 
 
 @dataclass(frozen=True)

@@ -29,21 +29,15 @@ STRIP_SECONDS = 1.0  # of motion for an outline; a little more than is shown
 
 @dataclass(frozen=True)
 class Page:
-    """A finished page.
-
-    Attributes:
-        html: the page.
-        counts: of goals, by robot.
-        missing: results that are missing by file, with the command that makes each.
-        absent: file and robot of figures that a file does not have, and why.
-        replays: robot and gait of each replay.
-    """
+    """A finished page."""
 
     html: str
-    counts: dict[str, dict[str, int]]
+    counts: dict[str, dict[str, int]]  # of goals, by robot
+    # Results that are missing by file, with the command that makes each.
     missing: dict[str, str]
+    # File and robot of figures that a file does not have, and why.
     absent: dict[tuple[str, str], str]
-    replays: list[tuple[str, str]]
+    replays: list[tuple[str, str]]  # robot and gait of each replay
 
 
 def build_report(

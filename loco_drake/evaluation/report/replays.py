@@ -27,21 +27,13 @@ _PIECE = 2000  # characters
 
 @dataclass(frozen=True)
 class Replay:
-    """A simulation that can be watched.
+    """A simulation that can be watched."""
 
-    Attributes:
-        robot: its name.
-        label: the gait.
-        html: a page of Meshcat that plays it.
-        fell: whether the robot did.
-        figures: of :func:`loco_drake.evaluation.tracking.tracking_metrics`.
-    """
-
-    robot: str
-    label: str
-    html: str
-    fell: bool
-    figures: dict[str, float]
+    robot: str  # its name
+    label: str  # the gait
+    html: str  # a page of Meshcat that plays it
+    fell: bool  # whether the robot did
+    figures: dict[str, float]  # of loco_drake.evaluation.tracking.tracking_metrics
 
 
 def record_replays(

@@ -23,20 +23,13 @@ _GREATEST = 1e12  # no figure is beyond that
 
 @dataclass(frozen=True)
 class ResultFile:
-    """A file of results.
+    """A file of results."""
 
-    Attributes:
-        name: without robot and suffix.
-        robots: whose figures it is to hold; its own, or all of them.
-        command: writes it, but for ``--json``.
-        flags: the part of ``command`` that figures of tracking do not tell.
-        holds: a key that all figures of a robot have; null where there are none.
-    """
-
-    name: str
-    robots: tuple[str, ...]
-    command: str
-    flags: str = ""
+    name: str  # without robot and suffix
+    robots: tuple[str, ...]  # whose figures it is to hold; its own, or all of them
+    command: str  # writes it, but for --json
+    flags: str = ""  # the part of command that figures of tracking do not tell
+    # A key that all figures of a robot have; null where there are none.
     holds: str = "labels"
 
     @property
@@ -84,14 +77,10 @@ class Figures:
     """Figures of one robot, or a part of them.
 
     Every method raises InputError where the file holds something else.
-
-    Attributes:
-        values: of a JSON object.
-        origin: the file, for messages.
     """
 
-    values: dict[str, Any]
-    origin: Path = Path()
+    values: dict[str, Any]  # of a JSON object
+    origin: Path = Path()  # the file, for messages
 
     def part(self, *keys: str) -> "Figures":
         """Returns the object that ``keys`` lead to."""
@@ -167,18 +156,12 @@ class Figures:
 
 @dataclass(frozen=True)
 class Results:
-    """All results in a folder.
+    """All results in a folder."""
 
-    Attributes:
-        folder: where they are.
-        found: by file, then by robot.
-        missing: expected files that are not there.
-        absent: file and robot of figures that a file does not have, and why.
-    """
-
-    folder: Path
-    found: dict[str, dict[str, Figures]]
-    missing: list[ResultFile]
+    folder: Path  # where they are
+    found: dict[str, dict[str, Figures]]  # by file, then by robot
+    missing: list[ResultFile]  # expected files that are not there
+    # File and robot of figures that a file does not have, and why.
     absent: dict[tuple[str, str], str]
 
     def of(self, name: str, robot: str) -> Figures | None:

@@ -21,17 +21,11 @@ def robot_title(name: str) -> str:
 
 @dataclass(frozen=True)
 class Cell:
-    """One entry.
+    """One entry."""
 
-    Attributes:
-        text: what is shown.
-        note: smaller, below it: an interval, a price.
-        reason: why there is nothing, if so.
-    """
-
-    text: str
-    note: str = ""
-    reason: str = ""
+    text: str  # what is shown
+    note: str = ""  # smaller, below it: an interval, a price
+    reason: str = ""  # why there is nothing, if so
 
 
 @dataclass(frozen=True)
@@ -45,23 +39,14 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table.
+    """A table."""
 
-    Attributes:
-        title: over it.
-        first: title of the rows' titles.
-        columns: titles, with units.
-        rows: the entries.
-        note: below it.
-        groups: titles over as many columns each, if any.
-    """
-
-    title: str
-    first: str
-    columns: tuple[str, ...]
-    rows: tuple[Row, ...]
-    note: str = ""
-    groups: tuple[str, ...] = ()
+    title: str  # over it
+    first: str  # title of the rows' titles
+    columns: tuple[str, ...]  # titles, with units
+    rows: tuple[Row, ...]  # the entries
+    note: str = ""  # below it
+    groups: tuple[str, ...] = ()  # titles over as many columns each, if any
 
     @property
     def reasons(self) -> list[str]:
