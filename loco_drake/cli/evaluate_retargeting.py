@@ -4,11 +4,8 @@ import time
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from rich.console import Console
-from rich.progress import Progress
-
 from loco_drake.cli.evaluation import Evaluation, print_by_label
-from loco_drake.cli.output import MARK, print_failed, print_warnings
+from loco_drake.cli.output import MARK, print_failed, print_warnings, tracked
 
 
 @dataclass(kw_only=True)
@@ -49,18 +46,13 @@ class EvaluateRetargeting(Evaluation):
         segments = select_labels(read_segments(data_dir(self.data_dir)), self.labels)
         variant = Variant(mirror=self.mirror, froude=self.froude)
         robots = {}
-        with Progress(console=Console(stderr=True), transient=True) as progress:
-            for robot in [load_robot(name) for name in names]:
-                start = time.perf_counter()
-                tracked = progress.track(
-                    score_segments(segments, robot, self.workers, variant),
-                    total=len(segments),
-                    description=f"Retargeting to {robot.name}",
-                )
-                robots[robot.name] = {
-                    **summarize(list(tracked)),
-                    "wall_clock_s": time.perf_counter() - start,
-                }
+        for robot in [load_robot(name) for name in names]:
+            start = time.perf_counter()
+            scores = score_segments(segments, robot, self.workers, variant)
+            what = f"Retargeting to {robot.name}"
+            figures = summarize(list(tracked(scores, what, len(segments))))
+            figures["wall_clock_s"] = time.perf_counter() - start
+            robots[robot.name] = figures
         return {"robots": robots, **asdict(variant)}
 
     def show(self, name: str, figures: dict[str, Any]) -> int:

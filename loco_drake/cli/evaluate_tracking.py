@@ -4,10 +4,8 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.progress import Progress
-
 from loco_drake.cli.evaluation import Evaluation, print_by_label
+from loco_drake.cli.output import tracked
 from loco_drake.common.errors import check_choice
 from loco_drake.motion.gaits import any_label, parse_label
 from loco_drake.tracking.randomization import RandomizationConfig
@@ -132,14 +130,7 @@ class EvaluateTracking(Evaluation):
     ) -> dict[str, Any]:
         from loco_drake.evaluation.tracking_table import run_trials, summarize
 
-        with Progress(console=Console(stderr=True), transient=True) as progress:
-            episodes = list(
-                progress.track(
-                    run_trials(scenario, trials, self.workers, self.randomization),
-                    total=len(trials),
-                    description=f"Simulating {name}",
-                )
-            )
+        episodes = run_trials(scenario, trials, self.workers, self.randomization)
         return {
             "robot": name,
             "reference": self.reference,
@@ -148,7 +139,7 @@ class EvaluateTracking(Evaluation):
             "friction": self.friction,
             "duration_s": self.duration,
             "randomization": asdict(self.randomization),
-            **summarize(episodes),
+            **summarize(list(tracked(episodes, f"Simulating {name}", len(trials)))),
         }
 
     def show(self, name: str, figures: dict[str, Any]) -> int:

@@ -4,10 +4,11 @@ import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.progress import track
 from rich.table import Table
 from rich.text import Text
 
@@ -16,6 +17,8 @@ from loco_drake.common.files import atomic_path, figures_sha256
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+Item = TypeVar("Item")
 
 
 def write_json(path: Path | None, figures: dict[str, Any]) -> None:
@@ -58,6 +61,12 @@ def print_table(
         table.add_row(*(Text(one_line(cell)) for cell in row))
     # Rich takes a file or a pipe for a terminal of 80 columns.
     Console(width=None if sys.stdout.isatty() else 160).print(table)
+
+
+def tracked(items: Iterable[Item], what: str, total: int) -> Iterable[Item]:
+    """Yields items and shows on stderr how many of ``total`` there have been."""
+    console = Console(stderr=True)
+    return track(items, what, total, console=console, transient=True)
 
 
 def print_failed(failed: Iterable[tuple[str, str]]) -> None:

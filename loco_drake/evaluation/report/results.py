@@ -171,10 +171,9 @@ class Results:
             name: of the file, without robot and suffix, such as "tracking-generated".
             robot: its name.
         """
-        files = [
-            self.found.get(file.path, {}) for file in EXPECTED if file.name == name
-        ]
-        return next((found[robot] for found in files if robot in found), None)
+        files = [file.path for file in EXPECTED if file.name == name]
+        found = (self.found.get(path, {}).get(robot) for path in files)
+        return next(filter(None, found), None)
 
     def of_robots(self, name: str) -> dict[str, Figures]:
         """Returns the figures of each robot that ``name`` has some of."""
