@@ -1,22 +1,34 @@
-"""What the environment costs beyond the plant: prints the ratio of their speeds.
+"""What the environments of training cost: beyond the plant, by two workers, in memory.
 
-The environments of one training worker, 16 robots, are stepped with zero actions on
-generated references, resets included.
-The bare plant (plant and scene graph, nothing else) is stepped as often at the same
-rate, in the same episodes: it starts in the same states and is sent the same targets,
-so that its legs swing and land as often; resets are not counted. They take turns in one
-process, and medians of its processor time are compared, so that a busy machine does
-little harm. Run it from the root of the repository:
+*Against the plant.* The environments of one worker, 16 robots, are stepped with zero
+actions on generated references, resets included. The bare plant (plant and scene graph,
+nothing else) is stepped as often at the same rate, in the same episodes: it starts in
+the same states and is sent the same targets, so that its legs swing and land as often;
+resets are not counted. They take turns in one process, and medians of its processor
+time are compared, so that a busy machine does little harm.
+
+*Two workers against one.* Both are there from the start and take turns, and the ratio
+is the median over the turns. This is wall-clock time, and needs two idle cores.
+
+*Memory.* The resident memory of trainer and workers in a training of many small
+batches, after the first tenth of them and at the end.
+
+Run it from the root of the repository:
 
     OMP_NUM_THREADS=1 python benchmarks/environment.py
 """
 
-import statistics
+import multiprocessing
+import os
+import subprocess
+import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 
 import numpy as np
+import torch
 import tyro
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -31,11 +43,15 @@ from loco_drake.models.plant import AddRobotPlant, ConfigureSimulator, PlantConf
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
 from loco_drake.tracking.batch import TrackingBatch
-from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.config import EnvironmentConfig, PpoConfig, TrainingConfig
 from loco_drake.tracking.randomization import STANDARD, RandomizationConfig
+from loco_drake.tracking.sampler import PlanSampler
+from loco_drake.tracking.train import Progress, train_tracker
+from loco_drake.tracking.workers import WorkerVecEnv
 
 ROBOT = "go2"
 ROBOTS = 16  # in a worker
+BATCH = 256  # of the training whose memory is measured
 
 
 def make_plans() -> list[Plan]:
@@ -62,14 +78,9 @@ class Episode:
 class Environment:
     """Steps the environments of one training worker and remembers their episodes."""
 
-    def __init__(
-        self, plans: list[Plan], config: PlantConfig, randomization: RandomizationConfig
-    ) -> None:
+    def __init__(self, plans: list[Plan], config: EnvironmentConfig) -> None:
         self._plans = plans
-        environment = EnvironmentConfig(
-            robot=ROBOT, plant=config, randomization=randomization
-        )
-        self._batch = TrackingBatch(plans, environment, ROBOTS)
+        self._batch = TrackingBatch(plans, config, ROBOTS)
         self._random = np.random.default_rng(0)
 
     def run(self, steps: int) -> tuple[float, list[Episode]]:
@@ -131,9 +142,96 @@ class BarePlant:
         return time.process_time() - start
 
 
+def against_plant(
+    plans: list[Plan], config: EnvironmentConfig, steps: int, turns: int
+) -> dict[str, float]:
+    """Returns steps/s of the environments and of the bare plant, and their ratio."""
+    environment, bare = Environment(plans, config), BarePlant(config.plant)
+    bare.follow(environment.run(100)[1])  # warm
+    pairs = []
+    for _ in range(turns):
+        own, episodes = environment.run(steps)
+        pairs.append((own, bare.follow(episodes)))
+    return {
+        "environment_steps_per_second": steps / median(own for own, _ in pairs),
+        "plant_steps_per_second": steps / median(plant for _, plant in pairs),
+        "ratio_to_plant": median(plant / own for own, plant in pairs),
+    }
+
+
+def two_workers(
+    plans: list[Plan], config: EnvironmentConfig, steps: int, turns: int
+) -> dict[str, float]:
+    """Returns steps/s of one worker and of two, and their ratio."""
+    both = [
+        WorkerVecEnv(
+            plans,
+            config,
+            PlanSampler(plans, 0),
+            workers=workers,
+            per_worker=ROBOTS,
+            seed=0,
+        )
+        for workers in (1, 2)
+    ]
+
+    def steps_per_second(environments: WorkerVecEnv, steps: int) -> float:
+        actions = np.zeros((environments.num_envs, 12), dtype=np.float32)
+        start = time.perf_counter()
+        for _ in range(steps):
+            environments.step(actions)
+        return steps * environments.num_envs / (time.perf_counter() - start)
+
+    for environments in both:
+        environments.reset()
+        steps_per_second(environments, 10)  # warm
+    turn = steps // ROBOTS
+    rates = [[steps_per_second(each, turn) for each in both] for _ in range(turns)]
+    for environments in both:
+        environments.close()
+    return {
+        "one_worker_steps_per_second": median(one for one, _ in rates),
+        "two_workers_steps_per_second": median(two for _, two in rates),
+        "ratio_of_workers": median(two / one for one, two in rates),
+    }
+
+
+def memory(
+    plans: list[Plan], config: EnvironmentConfig, batches: int
+) -> dict[str, float]:
+    """Returns the MB of trainer and workers, early and at the end of a training."""
+    sizes: list[dict[str, float]] = []
+
+    def resident(pid: int) -> float:
+        command = ["ps", "-o", "rss=", "-p", str(pid)]
+        return int(subprocess.check_output(command, text=True)) / 1024
+
+    def report(progress: Progress) -> None:
+        workers = sorted(child.pid or 0 for child in multiprocessing.active_children())
+        named = {"trainer": os.getpid()}
+        named |= {f"worker_{k}": pid for k, pid in enumerate(workers)}
+        sizes.append({name: resident(pid) for name, pid in named.items()})
+
+    training = TrainingConfig(
+        steps=(batches + 1) * BATCH,  # the last is not reported
+        per_worker=ROBOTS,
+        environment=config,
+        ppo=PpoConfig(batch=BATCH, minibatch=BATCH, epochs=1),
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        train_tracker(plans, training, Path(folder), report=report)
+    places = {"early": sizes[len(sizes) // 10], "late": sizes[-1]}
+    return {
+        f"{name}_mb_{when}": size
+        for when, own in places.items()
+        for name, size in own.items()
+    }
+
+
 def main(
     steps: int = 320,
     turns: int = 15,
+    batches: int = 100,
     contact: str = "similar",
     time_step: float = 0.01,
     randomize: bool = False,
@@ -142,35 +240,28 @@ def main(
     """Measures and prints.
 
     Args:
-        steps: in each turn.
+        steps: of a worker in each turn.
         turns: medians are of.
+        batches: of the training.
         contact: solver.
         time_step: of the physics, s.
         randomize: draw worlds in the environment.
         json: where to write the figures.
     """
-    config = PlantConfig(contact=contact, time_step=time_step)
+    torch.set_num_threads(1)
     plans = make_plans()
-    randomization = STANDARD if randomize else RandomizationConfig()
-    environment = Environment(plans, config, randomization)
-    bare = BarePlant(config)
-    bare.follow(environment.run(100)[1])  # warm
-    pairs = []
-    for _ in range(turns):
-        own, episodes = environment.run(steps)
-        pairs.append((own, bare.follow(episodes)))
-    own, plant = (
-        statistics.median(spent) / steps for spent in zip(*pairs, strict=True)
+    config = EnvironmentConfig(
+        robot=ROBOT,
+        plant=PlantConfig(contact=contact, time_step=time_step),
+        randomization=STANDARD if randomize else RandomizationConfig(),
     )
-    ratio = statistics.median(theirs / ours for ours, theirs in pairs)
-    print(f"environment {1e3 * own:.3f} ms a step, {1 / own:.0f} steps/s")
-    print(f"bare plant  {1e3 * plant:.3f} ms a step, {1 / plant:.0f} steps/s")
-    print(f"ratio of their speeds {ratio:.3f}")
     figures = {
-        "environment_steps_per_second": 1 / own,
-        "plant_steps_per_second": 1 / plant,
-        "ratio_to_plant": ratio,
+        **against_plant(plans, config, steps, turns),
+        **two_workers(plans, config, steps, turns),
+        **memory(plans, config, batches),
     }
+    for name, value in figures.items():
+        print(f"{name.replace('_', ' '):30} {value:9.2f}")
     write_json(json, figures)
 
 
