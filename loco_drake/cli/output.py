@@ -64,9 +64,10 @@ def print_table(
 
 
 def tracked(items: Iterable[Item], what: str, total: int) -> Iterable[Item]:
-    """Yields items and shows on stderr how many of ``total`` there have been."""
+    """Yields items and shows in a terminal how many of ``total`` there have been."""
     console = Console(stderr=True)
-    return track(items, what, total, console=console, transient=True)
+    hidden = not console.is_terminal
+    return track(items, what, total, console=console, transient=True, disable=hidden)
 
 
 def print_failed(failed: Iterable[tuple[str, str]]) -> None:

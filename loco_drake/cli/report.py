@@ -51,31 +51,20 @@ class Report:
             raise InputError("--replays is none, or gait labels, not both.")
         folder = self.results or results_dir()
         with Console(stderr=True).status("Reading results") as status:
-            report = build_report(
+            html, held = build_report(
                 folder, labels, self.replay_seconds, self.seed, status.update
             )
         with atomic_path(self.out) as temporary:
-            temporary.write_text(report.html, encoding="utf-8")
+            temporary.write_text(html, encoding="utf-8")
         size = self.out.stat().st_size
-        figures = {
-            "report": str(self.out),
-            "results": str(folder),
-            "bytes": size,
-            "goals": report.counts,
-            "missing": report.missing,
-            "replays": [f"{robot} {label}" for robot, label in report.replays],
-            "reason": {
-                f"{robot} in {file}": why
-                for (file, robot), why in report.absent.items()
-            },
-        }
-        write_json(self.json, figures)
+        paths = {"report": str(self.out), "results": str(folder), "bytes": size}
+        write_json(self.json, {**paths, **held})
         rows = [
             (robot, f"{count['met']} of {count['goals']}", str(count["measured"]))
-            for robot, count in report.counts.items()
+            for robot, count in held["goals"].items()
         ]
         print_table("Goals", ("robot", "met", "measured"), rows)
-        if report.missing:
-            print_table("Missing results", ("file", "made by"), report.missing.items())
+        if missing := held["missing"]:
+            print_table("Missing results", ("file", "made by"), missing.items())
         print(f"{self.out}: {size / 1e6:.1f} MB")
         return 0

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.parallel import map_in_workers
-from loco_drake.datasets.segments import Segment, read_segments, select_labels
+from loco_drake.datasets.segments import read_segments, select_labels
 from loco_drake.datasets.split import VALIDATION, Split
 from loco_drake.evaluation.samples import FRAMES
 from loco_drake.models.robots import Robot, get_robot
@@ -41,17 +41,6 @@ class Recorded:
         return tuple(str(k) for k in LABELS if all(str(k) in side for side in sides))
 
 
-class _Retarget:
-    """Retargets one segment, see :func:`retarget_recordings`."""
-
-    def __init__(self, robot: str, split: Split) -> None:
-        self._retarget = SegmentRetargeter(get_robot(robot), split)
-
-    def __call__(self, segment: Segment) -> tuple[str, Motion | str]:
-        result = self._retarget(segment)
-        return segment.name, result if isinstance(result, str) else result[1]
-
-
 def retarget_recordings(
     data_dir: Path, robot: Robot, labels: Iterable[str] = (), workers: int = 1
 ) -> Recorded:
@@ -69,13 +58,15 @@ def retarget_recordings(
     segments = read_segments(data_dir)
     names = {str(label) for label in LABELS}
     wanted = [s for s in select_labels(segments, labels) if s.label in names]
-    make = partial(_Retarget, robot.name, Split(segments))
+    make = partial(SegmentRetargeter, robot, Split(segments))
     motions, failed = [], {}
-    for name, result in map_in_workers(make, wanted, workers):
-        if isinstance(result, str):
-            failed[name] = result
+    for segment, made in zip(
+        wanted, map_in_workers(make, wanted, workers), strict=True
+    ):
+        if isinstance(made, str):
+            failed[segment.name] = made
         else:
-            motions.append(result)
+            motions.append(made[1])
     return by_split(motions, failed)
 
 

@@ -1,7 +1,6 @@
 """From a folder of results to a page: one HTML file that needs nothing else."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,27 +26,14 @@ from loco_drake.motion.motion import Motion
 STRIP_SECONDS = 1.0  # of motion for an outline; a little more than is shown
 
 
-@dataclass(frozen=True)
-class Page:
-    """A finished page."""
-
-    html: str
-    counts: dict[str, dict[str, int]]  # of goals, by robot
-    # Results that are missing by file, with the command that makes each.
-    missing: dict[str, str]
-    # File and robot of figures that a file does not have, and why.
-    absent: dict[tuple[str, str], str]
-    replays: list[tuple[str, str]]  # robot and gait of each replay
-
-
 def build_report(
     folder: Path,
     labels: Sequence[str],
     seconds: float,
     seed: int,
     say: Callable[[str], None] = lambda text: None,
-) -> Page:
-    """Returns the page of a folder of results.
+) -> tuple[str, dict[str, Any]]:
+    """Returns the page of a folder of results, and what it holds, as JSON.
 
     Args:
         folder: as :func:`.results.load_results` reads it.
@@ -76,13 +62,14 @@ def build_report(
         for replay in record_replays(robot, labels, seconds, seed):
             say(f"Simulated {robot}, {replay.label}")
             replays.append(replay)
-    return Page(
-        html=_render(shown, motions, replays),
-        counts=shown["counts"],
-        missing={file.path: file.command for file in results.missing},
-        absent=results.absent,
-        replays=[(replay.robot, replay.label) for replay in replays],
-    )
+    return _render(shown, motions, replays), {
+        "goals": shown["counts"],
+        "missing": {file.path: file.command for file in results.missing},
+        "replays": [f"{replay.robot} {replay.label}" for replay in replays],
+        "reason": {
+            f"{robot} in {file}": why for (file, robot), why in results.absent.items()
+        },
+    }
 
 
 def of_results(results: Results) -> dict[str, Any]:
