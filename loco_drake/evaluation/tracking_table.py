@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from loco_drake.common.errors import InputError
 from loco_drake.common.parallel import map_in_workers
 from loco_drake.control.plan import PLAN_DT, plan_from_motion
-from loco_drake.datasets.segments import Segment
+from loco_drake.datasets.segments import Segment, select_labels
 from loco_drake.evaluation.motion_scores import median
 from loco_drake.evaluation.tracking import (
     Recorder,
@@ -135,9 +135,7 @@ def retargeted_trials(
     """
     trials = []
     for label in labels:
-        own = [segment for segment in segments if segment.label == label]
-        if not own:
-            raise InputError(f"segments.csv has no stretch of {label}.")
+        own = select_labels(segments, [label])
         chosen = np.unique(np.linspace(0, len(own) - 1, count).round().astype(int))
         trials += [Trial(label, int(k), duration, own[k]) for k in chosen]
     return trials

@@ -68,3 +68,20 @@ def test_bad_options_are_one_sentence(options, message, capsys):
     error = capsys.readouterr().err.strip()
     assert message in error
     assert len(error.splitlines()) == 1
+
+
+def test_recordings_of_any_label_can_be_followed(made_data, tmp_path, capsys):
+    """Not only of the fifteen; of a label without recordings the choices are named."""
+    (tmp_path / "dog_mann").symlink_to(made_data / "dog_mann")
+    turn = "dog_mann,keypoints/made_pace.txt,turn_left,0,200,60,1,\n"
+    table = (made_data / "segments.csv").read_text() + turn
+    (tmp_path / "segments.csv").write_text(table)
+    path = tmp_path / "figures.json"
+    options = (
+        f"--reference retargeted --data-dir {tmp_path} --duration .1 --json {path}"
+    )
+    line = ["evaluate", "tracking", *options.split(), "--labels"]
+    assert main([*line, "dog-turn_left"]) == 0
+    assert list(json.loads(path.read_text())["labels"]) == ["dog-turn_left"]
+    assert main([*line, "dog-hop"]) == 2
+    assert "'dog-hop'; the choices are dog-pace" in capsys.readouterr().err

@@ -94,7 +94,7 @@ def test_trials_of_recordings_are_spread_over_all_of_a_label():
     chosen = retargeted_trials(segments, ["dog-trot"], 3, 10.0)
     assert [trial.segment.path.stem for trial in chosen] == ["0", "4", "8"]
     assert len(retargeted_trials(segments, ["dog-trot"], 50, 10.0)) == 9
-    with pytest.raises(InputError, match="no stretch of mpc-trot"):
+    with pytest.raises(InputError, match="'mpc-trot'; the choices are"):
         retargeted_trials(segments, ["mpc-trot"], 3, 10.0)
 
 

@@ -1,10 +1,17 @@
-"""From a folder of results to a page: one HTML file that needs nothing else."""
+"""From a folder of results to a page: one HTML file that needs nothing else.
 
-from collections.abc import Callable, Mapping, Sequence
+Replays are simulations of the shipped policies, as pages of Meshcat. Such a page is a
+viewer and meshes of several MB, and a recording of a few hundred kB. Replays of a robot
+differ in the recording alone, so that whatever they have in common is kept once.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from pydrake.geometry import Meshcat, MeshcatAnimation
 
 from loco_drake import __version__
 from loco_drake.common.errors import check_choice
@@ -12,18 +19,39 @@ from loco_drake.control.actor import load_actor
 from loco_drake.evaluation.report import pictures
 from loco_drake.evaluation.report.content import CONTENT
 from loco_drake.evaluation.report.goals import counts, scoreboard
-from loco_drake.evaluation.report.replays import Replay, record_replays, share_pieces
 from loco_drake.evaluation.report.results import Results, commands, load_results
 from loco_drake.evaluation.report.sections import all_tables, networks_table
 from loco_drake.evaluation.report.tables import figure_cell, robot_title
+from loco_drake.evaluation.tracking import (
+    FRAMES_PER_SECOND,
+    Recorder,
+    dress,
+    frame,
+    tracking_metrics,
+)
 from loco_drake.generation.generate import generate_motion
 from loco_drake.generation.motion_model import pretrained_motion_model
+from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS, get_robot
 from loco_drake.models.shipped import policy_path
 from loco_drake.motion.gaits import parse_label
 from loco_drake.motion.motion import Motion
+from loco_drake.systems.scenario import GeneratedReference, Scenario, TrainedPolicy
 
 STRIP_SECONDS = 1.0  # of motion for an outline; a little more than is shown
+_AGAIN = 10_000  # times that a replay is repeated
+_PIECE = 2000  # characters
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A simulation that can be watched."""
+
+    robot: str  # its name
+    label: str  # the gait
+    html: str  # a page of Meshcat that plays it
+    fell: bool  # whether the robot did
+    figures: dict[str, float]  # of loco_drake.evaluation.tracking.tracking_metrics
 
 
 def build_report(
@@ -135,3 +163,57 @@ def _motions(robot: str, seed: int) -> list[Motion]:
     model = pretrained_motion_model(robot)
     labels = map(parse_label, model.generator.config.labels)
     return [generate_motion(model, label, STRIP_SECONDS, seed) for label in labels]
+
+
+def record_replays(
+    robot: str, labels: Sequence[str], seconds: float, seed: int = 0
+) -> Iterator[Replay]:
+    """Simulates the shipped policy on generated motion, one gait after another.
+
+    Args:
+        robot: one that a policy is shipped for.
+        labels: that the policy was trained on; at least one.
+        seconds: of each, at most.
+        seed: of the generated motion.
+    """
+    scenario = Scenario(
+        robot=robot,
+        plant=PlantConfig(visual=True),
+        reference=GeneratedReference(gait=labels[0], seed=seed, duration=seconds),
+        policy=TrainedPolicy(),
+    )
+    meshcat = Meshcat()
+    dress(meshcat)
+    recorder = Recorder(scenario, meshcat)
+    for label in labels:
+        meshcat.DeleteRecording()
+        recorder.start(gait=label, seed=seed)
+        meshcat.StartRecording(frames_per_second=FRAMES_PER_SECOND)
+        rollout, _ = recorder.run(seconds)
+        meshcat.StopRecording()
+        animation = meshcat.get_mutable_recording()
+        animation.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
+        animation.set_repetitions(_AGAIN)
+        meshcat.PublishRecording()
+        frame(meshcat, rollout.state[:, 4:7])
+        figures = tracking_metrics(rollout)
+        yield Replay(robot, label, meshcat.StaticHtml(), rollout.fell, figures)
+
+
+def share_pieces(pages: Sequence[str]) -> dict[str, Any]:
+    """Returns all pieces of all pages, each once, and of which each page is made.
+
+    Joining the "pieces" that an entry of "pages" counts gives that page again. A line
+    is cut into pieces: meshes get new names with each simulation, so that no long line
+    is quite like another.
+    """
+    place: dict[str, int] = {}
+    made = [
+        [
+            place.setdefault(line[start : start + _PIECE], len(place))
+            for line in page.splitlines(keepends=True)
+            for start in range(0, len(line), _PIECE)
+        ]
+        for page in pages
+    ]
+    return {"pieces": list(place), "pages": made}

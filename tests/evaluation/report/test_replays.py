@@ -1,6 +1,6 @@
 """Replays that share what they have in common."""
 
-from loco_drake.evaluation.report.replays import share_pieces
+from loco_drake.evaluation.report.page import share_pieces
 
 
 def test_pages_come_back_whole_and_common_parts_are_kept_once():
