@@ -640,7 +640,7 @@ def test_damaged_motion_is_refused_in_one_sentence(cli, motion, how):
 
 def test_quaternion_of_the_base_stays_of_norm_one(cli):
     """quaternion-norm: after 6 s of a gallop, whose norm grew fastest."""
-    from loco_drake.evaluation.rollout import Recorder
+    from loco_drake.evaluation.tracking import Recorder
     from loco_drake.systems.scenario import GeneratedReference, Scenario
 
     reference = GeneratedReference(gait="dog-gallop", duration=6.0)
@@ -653,12 +653,12 @@ def test_quaternion_of_the_base_stays_of_norm_one(cli):
 
 def test_an_evaluation_builds_one_diagram(cli, monkeypatch):
     """diagrams_never_freed: however many labels and episodes; the docs say why."""
-    from loco_drake.evaluation import rollout
+    from loco_drake.evaluation import tracking
 
     built = []
-    make = rollout.AddLocomotion
+    make = tracking.AddLocomotion
     monkeypatch.setattr(
-        rollout,
+        tracking,
         "AddLocomotion",
         lambda *a, **k: built.append(1) or make(*a, **k),
     )

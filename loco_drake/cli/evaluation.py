@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rich.console import Console
 
 from loco_drake.cli.output import print_failed, print_table, write_results
-from loco_drake.common.errors import InputError, check_at_least, check_choice
+from loco_drake.common.errors import (
+    InputError,
+    check_at_least,
+    check_choice,
+    one_line,
+)
 from loco_drake.motion.gaits import parse_label
 
 if TYPE_CHECKING:
@@ -179,4 +184,4 @@ def print_report(table: "Table") -> None:
     ]
     print_table(table.title, (table.first, *columns), rows)
     for text in filter(None, (table.note, *table.reasons)):
-        print(text)
+        print(one_line(text))
