@@ -99,14 +99,9 @@ def _read(
         return None
     *path, last = figure.path.split(".")
     if "*" in path:
-        labels = within.parts(*path[: path.index("*")])
-        found = [
-            (v, name) for name, part in labels if (v := part.required(last)) is not None
-        ]
-        if not found:
-            return None
-        value, name = max(found) if highest else min(found)
-        return Measured(figure.factor * value, notes=(name,))
+        pick = max if highest else min
+        found = within.extreme(pick, last, *path[: path.index("*")])
+        return found and Measured(figure.factor * found[0], notes=(found[1],))
     if last.endswith("[-1]"):
         values = within.numbers(*path, last.removesuffix("[-1]"))
         ended = values[-1] if values else None

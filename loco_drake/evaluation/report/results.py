@@ -4,7 +4,7 @@ Whatever is read of them is checked. A file that holds anything else than it sho
 damaged, which one sentence says.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -96,6 +96,18 @@ class Figures:
         within = self.part(*keys)
         for name in within.values:
             yield name, within.part(name)
+
+    def extreme(
+        self, pick: Callable[..., Any], key: str, *keys: str
+    ) -> tuple[float, str] | None:
+        """Returns the least or greatest of a figure of all parts, and whose it is."""
+        found = [
+            (value, name)
+            for name, part in self.parts(*keys)
+            if (value := part.required(key)) is not None
+        ]
+        worst: tuple[float, str] | None = pick(found, default=None)
+        return worst
 
     def number(self, key: str) -> float | None:
         """Returns a figure; None if it is null, or an older result without it."""

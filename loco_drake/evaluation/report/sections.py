@@ -104,16 +104,12 @@ def _drift(figures: Figures, row: Row) -> Cell:
         value = figures.number("drift_60s")
         return Cell(NOTHING if value is None else number(value, 2))
     labels = figures.part("drift", "labels")
-    worst = [
-        (value, what)
-        for what, part in (
-            labels.parts(row.title) if row.title in labels.values else ()
-        )
-        if (value := part.number("drift")) is not None
-    ]
-    if not worst:
+    if row.title not in labels.values:
         return Cell(NOTHING)
-    value, what = max(worst)
+    worst = labels.extreme(max, "drift", row.title)
+    if worst is None:
+        return Cell(NOTHING)
+    value, what = worst
     what = what.removesuffix("_mps").removesuffix("_m").removesuffix("_s")
     return Cell(number(value, 2), note=what.replace("_", " "))
 
@@ -189,15 +185,8 @@ def _whole_cells(figures: Figures | None) -> tuple[Cell, ...]:
 
 
 def _worst(figures: Figures) -> Cell:
-    returns = [
-        (value, label)
-        for label, part in figures.parts("labels")
-        if (value := part.required("normalized_return")) is not None
-    ]
-    if not returns:
-        return Cell(NOTHING)
-    value, label = min(returns)
-    return Cell(number(value, 1), note=label)
+    worst = figures.extreme(min, "normalized_return", "labels")
+    return Cell(number(worst[0], 1), note=worst[1]) if worst else Cell(NOTHING)
 
 
 def conditions_text(figures: Figures) -> str:
