@@ -1,4 +1,4 @@
-"""The BVH form of motion capture: a skeleton, and its joint angles frame by frame."""
+"""BVH motion capture files: a skeleton and its joint angles per frame."""
 
 import re
 from dataclasses import dataclass
@@ -55,10 +55,10 @@ class Bvh:
     fps: float
 
     def positions(self) -> Array:
-        """Returns where the joints are, by forward kinematics, shape (T, J, 3).
+        """Returns joint positions by forward kinematics, shape (T, J, 3).
 
-        Rotations of a joint apply in the order of its channels, each about the axes
-        that the one before has turned; position channels replace the offset.
+        Rotations of a joint are intrinsic, in the order of its channels; position
+        channels replace the offset.
         """
         p = np.empty((len(self.motion), len(self.joints), 3))
         turned: list[Rotation] = []
@@ -85,10 +85,10 @@ class Bvh:
         return p
 
     def find(self, chain: tuple[str, ...]) -> int:
-        """Returns the last joint of a chain of names, other joints may lie between.
+        """Returns the last joint of a chain of names, which other joints may interrupt.
 
-        A name in the file may be in another case, and have a namespace before it:
-        ``dog:hips``. An end site is also found behind further joints.
+        Case and namespaces such as ``dog:`` are ignored. An end site may also be behind
+        further joints.
 
         Raises:
             LookupError: with the first name of the chain that is not found.

@@ -1,10 +1,10 @@
-"""Axes, sides, ground and rate of a recording: measured, then mended or refused.
+"""Measures axes, sides, ground and rate of a recording, and corrects or refuses them.
 
-A file's format says which axis is up, which toe is the left one in front, and how many
-frames make a second; files in circulation often differ. The motion contradicts a wrong
-convention: a trunk is above its toes, toes on the left are left of it, feet stand on
-the ground, and a stride takes as long as gravity lets it (Alexander and Jayes 1983).
-All readers' recordings pass here.
+The format of a file defines its up axis, the order of its toes and its rate, but files
+in circulation often deviate. The motion contradicts a wrong convention: a trunk is
+above its toes, left toes are left of it, feet stand on the ground, and a stride has a
+plausible period under gravity (Alexander and Jayes 1983). The recordings of all readers
+are checked here.
 """
 
 from dataclasses import replace
@@ -58,15 +58,15 @@ FASTEST = 10.0
 
 
 def measure(recording: Recording, body: Body, path: Path) -> Recording:
-    """Returns a recording with its conventions mended, checked against its body.
+    """Returns a recording with corrected conventions, checked against its body.
 
     Args:
         recording: as a reader returns it.
-        body: what recordings of its source are held to.
-        path: of the file, for messages.
+        body: bounds of its source.
+        path: the file, for messages.
 
     Raises:
-        InputError: if it cannot be such a recording; names the frame, or the figure.
+        InputError: if the recording is implausible; names the frame or the figure.
     """
     points, notes = recording.points, dict(recording.notes)
     if points.shape[1:] != (6, 3) or not np.isfinite(points).all():
@@ -81,19 +81,19 @@ def measure(recording: Recording, body: Body, path: Path) -> Recording:
 
 
 def orient(points: Array, body: Body, path: Path, notes: dict[str, str]) -> Array:
-    """Returns points (T, 6, 3) with z up and each toe where its name says.
+    """Returns points (T, 6, 3) with z up and toes in order.
 
-    Readers that need this themselves call it, too: what is right stays as it is.
+    Readers may call it themselves; correct points do not change.
 
     Args:
-        points: withers, hip, toes FL, FR, RL, RR in m; NaN where one was not seen.
-        body: how large it may be.
-        path: of the file, for messages.
-        notes: is told what was mended.
+        points: withers, hip, toes FL, FR, RL, RR in m; NaN where one is missing.
+        body: bounds of its size.
+        path: the file, for messages.
+        notes: receives the corrections.
 
     Raises:
-        InputError: if it cannot be told which way is up, the size cannot be, or there
-            are too few frames.
+        InputError: if the up axis is unclear, the size is implausible, or there are too
+            few frames.
     """
     check_frames(points, path)
     if not all_seen(points).any():
@@ -136,8 +136,8 @@ def _turn_up(points: Array, path: Path, notes: dict[str, str]) -> Array:
 def _name_toes(points: Array, notes: dict[str, str]) -> Array:
     """Returns points with front toes in front and left toes on the left.
 
-    More than one exchange can explain what is seen. Animals go ahead for most of the
-    time, so that the way tells; without any, the least exchange is taken.
+    Several exchanges can explain an observation. Animals mostly walk forward, so the
+    path decides; without any path the smallest exchange is taken.
     """
     ahead, left, way = _offsets(points)
     crossed = left[[0, 2]] - left[[1, 3]] < -SIDEWAYS
@@ -162,9 +162,9 @@ def _name_toes(points: Array, notes: dict[str, str]) -> Array:
 
 
 def _offsets(points: Array) -> tuple[Array, Array, float]:
-    """Returns how far toes (4,) are ahead and to the left, and the way ahead.
+    """Returns mean offsets of the toes (4,) ahead and to the left, and the path ahead.
 
-    All are means over the frames, or the sum, in trunk lengths.
+    All are in trunk lengths.
     """
     points = points[all_seen(points)]
     points = points / _trunk_length(points)
@@ -195,9 +195,9 @@ def _size(points: Array) -> float:
 
 
 def ground_height(points: Array) -> float:
-    """Returns the height of the ground in m; 0 if it is there as near as markers tell.
+    """Returns the height of the ground in m; 0 if it is within marker accuracy.
 
-    Where markers sit high on the toes of a pair, those of the other pair tell.
+    Uses the lower pair of toes, since the markers of a pair may sit high on the toes.
     """
     stance = np.percentile(points[:, 2:, 2], STANCE_PERCENTILE, axis=0)
     ground = float(min(stance[:2].mean(), stance[2:].mean()))
@@ -205,7 +205,7 @@ def ground_height(points: Array) -> float:
 
 
 def _check_level(points: Array, path: Path) -> None:
-    """Raises InputError if the toes that stand stand on a slope."""
+    """Raises InputError if the toes in stance are on a slope."""
     toes = points[1:, 2:]
     steps = np.linalg.norm(np.diff(points[:, 2:], axis=0), axis=-1)
     stood = toes[steps <= np.percentile(steps, 25, axis=0)]
@@ -222,9 +222,9 @@ def _check_level(points: Array, path: Path) -> None:
 
 
 def put_on_ground(points: Array, body: Body, notes: dict[str, str]) -> Array:
-    """Returns points (T, 6, 3) with the ground at z = 0, trunk and toes alike.
+    """Returns points (T, 6, 3) with the ground at z = 0.
 
-    Toes that are markers are then moved by what is left, foot by foot.
+    Shifts trunk and toes, then each marker toe by its remaining offset.
     """
     points = points.copy()
     if ground := ground_height(points):
@@ -237,7 +237,7 @@ def put_on_ground(points: Array, body: Body, notes: dict[str, str]) -> Array:
 
 
 def check_motion(recording: Recording, body: Body, path: Path) -> None:
-    """Checks that a recording, z up on the ground, moves as such a body can.
+    """Checks that the motion of a recording, z up, is plausible for its body.
 
     Raises:
         InputError: if steps, reach of the legs, speed or the rhythm of the strides

@@ -1,11 +1,11 @@
 """The dog of the MANN motion capture (Zhang, Starke, Komura, Saito, SIGGRAPH 2018).
 
-Two forms of a recording, both y up, right-handed, 60 frames a second, toes of a
-standing dog near y = 0:
+A recording has one of two formats, both y up, right-handed, 60 frames/s, with the toes
+of a standing dog near y = 0:
 
-* keypoints: 81 columns and no header, 27 points x (x, y, z) in metres;
-* BVH: the skeleton in centimetres and its joint angles, from which the same 27 points
-  follow; they lie elsewhere in the plane.
+* keypoints: 81 columns without header, 27 points x (x, y, z) in metres;
+* BVH: a skeleton in centimetres and joint angles, from which the same 27 points follow,
+  at another place in the plane.
 """
 
 from pathlib import Path
@@ -20,10 +20,10 @@ COLUMNS = 81
 FORMAT = "a dog keypoint file"
 BVH_FORMAT = "a BVH file of the dog"
 
-# Of the 27 points: withers, hip, toes FL, FR, RL, RR. The withers are the base of the
-# neck: it lies on the spine as the hip does, whereas the shoulder points (6, 11) hang 3
-# cm below it, which would tilt the trunk down by four degrees more. Standing front toes
-# are marked 2 cm above the ground, rear toes at 0.
+# Indices of withers, hip, toes FL, FR, RL, RR. The withers are the base of the neck,
+# which lies on the spine like the hip. The shoulder points (6, 11) are 3 cm lower and
+# would pitch the trunk by another four degrees. Front toes in stance are marked 2 cm
+# above the ground, rear toes at 0.
 POINTS = (3, 0, 10, 15, 19, 23)
 # The same in the skeleton; other joints may lie between, before and behind these.
 _SPINE, _CHEST = ("Hips", "Spine", "Spine1"), ("Hips", "Spine", "Spine1")
@@ -44,7 +44,7 @@ BODY = Body(trunk=(0.2, 0.8), height=(0.1, 1.0), stride=(1.3, 4.2), jump=0.25)
 def read_dog(
     path: Path, start: int | None, end: int | None, fps: float | None
 ) -> Recording:
-    """Reads a dog recording in either form; without ``fps`` it has 60, or its own.
+    """Reads a dog recording in either format; the default rate is 60, or the BVH's.
 
     Raises:
         InputError: if the file is not of this format.

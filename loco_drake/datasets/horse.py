@@ -1,15 +1,15 @@
 """The Haflinger horses of the Vienna Horse Data Collection, on a treadmill.
 
-Two forms of a recording with 7 markers (head, withers, sacrum, lateral walls of the
-hooves FL, FR, RL, RR), z up:
+A recording has one of two formats with 7 markers (head, withers, sacrum, lateral walls
+of the hooves FL, FR, RL, RR), z up:
 
 * raw, with a header: frame, time in s and 21 coordinates in mm, x forward, y left in
-  the treadmill's frame; a marker that was not seen leaves a gap;
-* 21 columns without header, in metres, x and y moved to somebody's estimate of the
-  world, whose stance hooves slide at .15 m/s.
+  the treadmill's frame; missing markers are gaps;
+* 21 columns without header, in metres, with x and y in an estimate of the world, in
+  which stance hooves slide at .15 m/s.
 
-Of both only positions relative to the withers are used, see
-:mod:`loco_drake.datasets.treadmill`, so that both give the same clip.
+Only positions relative to the withers are used, see
+:mod:`loco_drake.datasets.treadmill`, so both formats give the same clip.
 """
 
 import re
@@ -68,11 +68,11 @@ MAX_RATIO = 1.35
 def read_horse(
     path: Path, start: int | None, end: int | None, fps: float | None
 ) -> Recording:
-    """Reads the frames around ``start`` to ``end`` that have no gaps.
+    """Reads the frames without gaps around ``start`` to ``end``, without the treadmill.
 
-    Without them it is the longest stretch there is, as with one end only. The treadmill
-    is undone. The rate is that of the time column, of the day in the file's name (M1:
-    60, M2 and M3: 120) or of the strides, in this order.
+    Without these, it is the longest stretch without gaps. The rate is that of the time
+    column, of the day in the file's name (M1: 60, M2 and M3: 120) or of the strides, in
+    this order.
 
     Raises:
         InputError: if the file is not of this format, the stretch not within it or has
@@ -135,11 +135,11 @@ def _read_world(path: Path) -> tuple[Array, None]:
 
 
 def infer_rate(points: Array) -> float | None:
-    """Returns the rate at which the strides of points (T, 6, 3) last as a horse's.
+    """Returns the rate at which the strides in points (T, 6, 3) match a horse's.
 
-    Animals of one build move alike when times are scaled by sqrt(height / g) (Alexander
-    and Jayes 1983), and walk and trot are told apart without a clock. Gaps are left
-    out. None if there are too few strides, or none of the rates fits.
+    Animals of similar build have similar strides when time is scaled by sqrt(height /
+    g) (Alexander and Jayes 1983); walk and trot are distinguished without a clock. Gaps
+    are left out. Returns None if there are too few strides, or no rate matches.
     """
     points = points[all_seen(points)]
     if len(points) < 8:
@@ -159,7 +159,7 @@ def infer_rate(points: Array) -> float | None:
 
 
 def mend_gaps(points: Array, longest: int) -> tuple[Array, int]:
-    """Returns points whose short gaps are bridged by cubic splines.
+    """Returns points with short gaps bridged by cubic splines.
 
     Args:
         points: shape (T, N, 3), NaN where a marker was not seen.
@@ -186,7 +186,7 @@ def mend_gaps(points: Array, longest: int) -> tuple[Array, int]:
 def usable_stretch(
     points: Array, start: int | None, end: int | None, name: str
 ) -> tuple[slice, int]:
-    """Returns where the points have no gaps, and the stretch of that to be read.
+    """Returns the frames without gaps around a stretch, and its first frame.
 
     Args:
         points: shape (T, N, 3), NaN where a marker was not seen.

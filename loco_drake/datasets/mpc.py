@@ -23,7 +23,7 @@ FORMAT = "an mpc keypoint file"
 HALF_SIZE = (0.1505, 0.044)
 
 BODY = Body(height=(0.08, 0.4), stride=(0.5, 5.0), jump=0.28, markers=False)
-# Ground further off than this, m, is worth a word.
+# A larger shift of the ground, m, is reported.
 GROUND = 0.02
 
 RATES = (100.0, 200.0)
@@ -43,10 +43,10 @@ STILL = 1e-5
 def read_mpc(
     path: Path, start: int | None, end: int | None, fps: float | None
 ) -> Recording:
-    """Reads a simulated run; without ``fps`` its swings tell the rate.
+    """Reads a simulated run; its default rate is inferred from the swings.
 
-    The median height of all standing feet becomes the ground: a pacing robot stands
-    12 mm above that of its simulator.
+    The median height of all feet in stance becomes the ground: a pacing robot stands 12
+    mm above that of its simulator.
 
     Raises:
         InputError: if the file is not of this format, or its rate not to be found or
@@ -69,10 +69,10 @@ def stance_height(feet: Array) -> float:
 
 
 def infer_rate(feet: Array, path: Path, fps: float | None) -> float:
-    """Returns the frames per second of feet (T, 4, 3), ``fps`` unless it is wrong.
+    """Returns the rate of feet (T, 4, 3) in frames/s, ``fps`` if it is plausible.
 
-    The controller swings every foot for a fixed time, so the frames of a swing tell the
-    rate, also of a file that was cut. Without a whole swing the length of the run does.
+    The controller swings every foot for a fixed time, so the number of frames of a
+    whole swing gives the rate. Without a whole swing, the length of the run does.
 
     Raises:
         InputError: if neither tells, or the swings contradict ``fps``.
@@ -110,7 +110,7 @@ def _still(feet: Array) -> Bools:
 
 
 def _whole_runs(flags: Bools) -> list[int]:
-    """Returns lengths of the runs of True in the columns that no end of them cuts."""
+    """Returns lengths of the runs of True in each column, except at its ends."""
     return [
         end - start
         for column in flags.T

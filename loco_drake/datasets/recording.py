@@ -1,4 +1,4 @@
-"""What a reader returns, and what is known beforehand of the body that it shows."""
+"""Recording, the result of a reader, and Body, the bounds of its source."""
 
 from collections.abc import Sized
 from dataclasses import dataclass, field
@@ -11,9 +11,9 @@ from loco_drake.common.errors import InputError
 
 Array = NDArray[np.float64]
 
-# Cameras and simulators take no fewer and no more frames per second.
+# Plausible rates of cameras and simulators, frames/s.
 RATES = (10.0, 1000.0)
-# Fewer cannot be interpolated.
+# Needed for interpolation.
 MIN_FRAMES = 4
 
 
@@ -21,15 +21,15 @@ MIN_FRAMES = 4
 class Recording:
     """Six points of an animal or robot over a whole file, in metres.
 
-    Which axis is up, where the ground is, which toe is left and which in front need not
-    be right: :mod:`loco_drake.datasets.conventions` measures them.
+    Up axis, ground and the order of toes need not follow the conventions, since
+    :mod:`loco_drake.datasets.conventions` measures them.
 
     Attributes:
         points: withers, hip, toes FL, FR, RL, RR, shape (T, 6, 3).
         fps: frames per second.
         first: number in the file of the first of these frames.
-        start: number in the file of the first frame of use, where nobody asks for one.
-        notes: what was mended, for the clip's provenance.
+        start: number in the file of the first usable frame, the default start.
+        notes: corrections, for the clip's provenance.
     """
 
     points: Array
@@ -41,16 +41,16 @@ class Recording:
 
 @dataclass(frozen=True)
 class Body:
-    """What all recordings of a source have in common: beyond it something is wrong.
+    """Bounds that all recordings of a source satisfy.
 
     Attributes:
-        trunk: shortest and longest distance of withers and hip in m.
-        height: lowest and highest middle of the trunk over the toes in m, standing.
-        stride: shortest and longest period, in units of sqrt(height / g).
-        jump: how far a toe may be from where its last two frames point, as a share of
-            the larger of trunk and height.
-        markers: whether toes are markers, each at its own height over the ground when
-            it stands, rather than exact points.
+        trunk: range of the distance between withers and hip, m.
+        height: range of the height of the trunk's middle over the toes in stance, m.
+        stride: range of the stride period, in units of sqrt(height / g).
+        jump: largest deviation of a toe from linear extrapolation of its last two
+            frames, as a share of the larger of trunk and height.
+        markers: whether toes are markers with individual height offsets, rather than
+            exact points.
     """
 
     trunk: tuple[float, float] = (0.03, 5.0)
@@ -89,7 +89,7 @@ def check_frames(frames: Sized, path: Path) -> None:
 
 
 def check_told(told: float, fps: float | None, path: Path, what: str) -> float:
-    """Returns the rate that a motion tells, or the one given if it agrees.
+    """Returns the rate inferred from the motion, or the given one if it agrees.
 
     Raises:
         InputError: if they differ by more than a third.
@@ -103,7 +103,7 @@ def check_told(told: float, fps: float | None, path: Path, what: str) -> float:
 
 
 def all_seen(points: Array) -> NDArray[np.bool_]:
-    """Returns in which frames (T,) of ``points`` (T, ...) nothing is missing."""
+    """Returns for each frame (T,) of ``points`` (T, ...) whether it is complete."""
     flat = points.reshape(len(points), -1)
     return np.asarray(np.isfinite(flat).all(axis=1), dtype=np.bool_)
 

@@ -1,4 +1,4 @@
-"""The sources of motion: where their files lie, whose they are, what reads them."""
+"""Registry of the sources of motion: folder, licence and reader of each."""
 
 import logging
 import os
@@ -24,9 +24,9 @@ from loco_drake.datasets.recording import (
 from loco_drake.motion.keypoints import KeypointClip
 
 DATA_VARIABLE = "LOCO_DRAKE_DATA"
-# Installed packages name their datasets in this group of entry points.
+# Entry point group in which installed packages register datasets.
 ENTRY_POINTS = "loco_drake.datasets"
-# Notes on what was mended that contradicts the format, and is said aloud.
+# Corrections of contradictions to the format, which are logged as warnings.
 MENDED = ("up", "turned", "swapped", "ground")
 
 
@@ -37,15 +37,15 @@ class Dataset:
     Attributes:
         source: its name, such as ``dog``: lower-case letters and digits.
         folder: name of its folder inside the data folder.
-        licence: under which its files, and all that is made from them, may be used.
-        attribution: whom to name.
-        read: reads one file: called with its path, the first frame and the frame after
-            the last that are wanted and the rate, each None if nobody says. It may
-            return more frames than are wanted. Raises InputError for another format.
-        body: what recordings are held to.
-        config: YAML file that says how it is retargeted, see
-            :mod:`loco_drake.retargeting.source_config`; None for
-            ``loco_drake/retargeting/sources/SOURCE.yaml``, else the defaults.
+        licence: licence of its files and of everything derived from them.
+        attribution: authors to name.
+        read: reads one file, given its path, the first and end frame of interest and
+            the rate, each None if unknown. It may return more frames. Raises InputError
+            for another format.
+        body: bounds that recordings must satisfy.
+        config: YAML file of its retargeting configuration, see
+            :mod:`loco_drake.retargeting.source_config`; if None,
+            ``loco_drake/retargeting/sources/SOURCE.yaml`` or the defaults.
     """
 
     source: str
@@ -61,10 +61,10 @@ DATASETS: dict[str, Dataset] = {}
 
 
 def register_dataset(dataset: Dataset) -> None:
-    """Makes a source known to this process.
+    """Registers a source in this process.
 
-    For all commands, name the dataset as an entry point of an installed package, in the
-    group ``loco_drake.datasets``.
+    To register it for all commands, name the dataset as an entry point of an installed
+    package, in the group ``loco_drake.datasets``.
 
     Raises:
         InputError: if its name or folder cannot be, or is taken.
@@ -148,22 +148,22 @@ def read_clip(
     end: int | None = None,
     fps: float | None = None,
 ) -> KeypointClip:
-    """Reads one stretch of one recording, its licence in the provenance.
+    """Reads one stretch of one recording, with its licence in the provenance.
 
-    Its conventions are measured over the whole recording. What was mended stands in the
-    provenance, and is logged as a warning.
+    Conventions are measured over the whole recording. Corrections are stored in the
+    provenance and logged as warnings.
 
     Args:
-        source: whose format the file has, a key of :data:`DATASETS`.
+        source: source of the file, a key of :data:`DATASETS`.
         path: the file.
-        gait: what the animal or robot does in that stretch.
-        start: first frame, from 0; None for the first of use.
-        end: frame after the last; None for the end of the file.
-        fps: frames per second; None if the format, the file or its motion tells.
+        gait: the gait in this stretch.
+        start: first frame, from 0; None for the first usable one.
+        end: end frame, exclusive; None for the end of the file.
+        fps: frames per second; None to infer it.
 
     Raises:
-        InputError: if the source is unknown, the file not of its format, the stretch
-            not within it, or what it shows cannot be.
+        InputError: if the source is unknown, the file is not of its format, the stretch
+            is not within it, or its motion is implausible.
     """
     dataset, path = get_dataset(source), Path(path)
     if fps is not None:
@@ -201,7 +201,7 @@ def read_clip(
 def _stretch(
     recording: Recording, start: int | None, end: int | None, path: Path
 ) -> tuple[Array, int, int]:
-    """Returns a stretch that starts along +x, its first frame, and that after it."""
+    """Returns a stretch that starts along +x, its first frame and its end frame."""
     total = recording.first + len(recording.points)
     if start is None:
         start = recording.first if recording.start is None else recording.start
@@ -213,15 +213,15 @@ def _stretch(
 
 @cache
 def _warn(text: str) -> None:
-    """Logs a warning once, however often a process reads the file."""
+    """Logs a warning once per process."""
     logging.getLogger(__name__).warning("%s", one_line(text))
 
 
 def data_target(path: Path | None = None) -> Path:
-    """Returns where the folder of the recordings is, or is to be.
+    """Returns the path of the data folder, which may not exist.
 
-    It is ``path`` if given, else that of the variable ``LOCO_DRAKE_DATA``, else
-    ``data`` in the user's cache folder.
+    It is ``path`` if given, else the variable ``LOCO_DRAKE_DATA``, else ``data`` in the
+    user's cache folder.
     """
     given = path or os.environ.get(DATA_VARIABLE)
     return Path(given) if given else cache_dir() / "data"

@@ -1,4 +1,4 @@
-"""Which stretch of which file holds which gait: ``segments.csv`` of the data folder."""
+"""Segments: the stretches of recordings listed in ``segments.csv``."""
 
 import csv
 import io
@@ -27,7 +27,7 @@ _HORSE = re.compile(r"(Horse\d+)_M\d+_")
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of a recording that holds one gait.
+    """A stretch of a recording with one gait.
 
     Attributes:
         source: a key of :data:`loco_drake.datasets.registry.DATASETS`.
@@ -65,28 +65,28 @@ class Segment:
 
     @property
     def label(self) -> str:
-        """What it holds, such as ``dog-trot``; need not be one of the fifteen."""
+        """Label such as ``dog-trot``; need not be one of the fifteen."""
         return f"{self.source}-{self.gait}"
 
     @property
     def seconds(self) -> float:
-        """Length of the segment."""
+        """Duration, s."""
         return (self.end - self.start) / self.fps
 
     @property
     def recording(self) -> str:
-        """Names the file, without its ending."""
+        """Name of the file without its extension."""
         return self.path.stem
 
     @property
     def animal(self) -> str | None:
-        """Names the animal where the file's name does: ``Horse3``."""
+        """The animal, such as ``Horse3``, if the file's name contains it."""
         horse = _HORSE.match(self.path.name) if self.source == "horse" else None
         return horse[1] if horse else None
 
     @property
     def subject(self) -> str:
-        """Names the animal, or else the recording, and its source."""
+        """Source and animal, or source and recording if it is unknown."""
         return f"{self.source}-{self.animal or self.recording}"
 
     def read(self) -> KeypointClip:
@@ -165,9 +165,8 @@ def write_rows(table: Path, rows: Iterable[Row]) -> None:
 def add_shipped_rows(rows: Iterable[Row], files: Iterable[str]) -> list[Row]:
     """Returns a table with the shipped stretches of some files added.
 
-    A file that the table already speaks of keeps the rows that it has there, which may
-    be the user's own. The order is that of the shipped table, whatever was added first;
-    rows of other files come last.
+    Files that are already in the table keep their rows, which may be the user's. The
+    order is that of the shipped table, with rows of other files last.
 
     Args:
         rows: the table so far.
@@ -193,7 +192,7 @@ def _by_file(rows: Iterable[Row]) -> dict[str, list[Row]]:
 
 
 def read_segments(data_dir: Path) -> list[Segment]:
-    """Returns the segments of all sources that can be read, in the file's order.
+    """Returns the segments of all known sources, in the file's order.
 
     Raises:
         InputError: if ``segments.csv`` is missing or damaged, a row cannot be or
@@ -247,10 +246,10 @@ def read_segments(data_dir: Path) -> list[Segment]:
 
 
 def one_format(segments: Iterable[Segment]) -> list[Segment]:
-    """Returns the segments without those of recordings that are there as measured, too.
+    """Returns the segments without converted copies of recordings.
 
-    The horses' ``.csv`` files are as they were measured; others have made ``.txt``
-    files of some of them, which hold the same strides again.
+    The horses' ``.csv`` files are as measured; their ``.txt`` files, converted by
+    others, contain the same strides.
     """
     segments = list(segments)
     measured = {(s.source, s.recording) for s in segments if _is_measured(s)}
@@ -284,7 +283,7 @@ def select_segments(
 ) -> list[Segment]:
     """Returns the segments of ``source`` (None: any) and of ``gaits``.
 
-    Without gaits they are those that hold one of the fifteen labels.
+    Without gaits, these are the segments with one of the fifteen labels.
 
     Raises:
         InputError: if a gait, or everything, has no segment; names those that do.

@@ -1,7 +1,7 @@
-"""What the two simulated robots have in common: nine points, exact and rigid.
+"""Reader for the two simulated robots.
 
-A file holds 27 columns and no header: 9 points x (x, y, z) in metres, z up: the centre
-of the trunk, four hips and four feet, in an order of its own.
+A file has 27 columns and no header: 9 points x (x, y, z) in metres, z up: the centre of
+the trunk, four hips and four feet, in an order that depends on the source.
 """
 
 from pathlib import Path
@@ -26,9 +26,9 @@ def read_robot(
 ) -> Array:
     """Returns the points of a file: withers, hip, feet FL, FR, RL, RR, (T, 6, 3) in m.
 
-    Withers and hip are the middles of the front and of the rear hips. They lie at the
-    height of the hips, as the origin of a robot's trunk does, so that the line between
-    them is the trunk's x axis.
+    Withers and hip are the midpoints of the front and rear hips. They are at the height
+    of the hips, like the origin of a robot's trunk, so the line between them is the
+    trunk's x axis.
 
     Args:
         path: the file.

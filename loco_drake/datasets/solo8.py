@@ -1,9 +1,9 @@
 """The simulated robot Solo8 of CASSI.
 
-CASSI: Li, Blaes, Kolev, Vlastelica, Frey, Martius (ICRA 2023). A file holds 27 columns:
-centre of the trunk; hips FL, FR, RL, RR; feet FL, FR, RL, RR; 50 frames a second. A
-foot is the centre of its ball. Each run begins with a drop from .34 m, in which nothing
-of a gait is seen.
+CASSI: Li, Blaes, Kolev, Vlastelica, Frey, Martius (ICRA 2023). A file has 27 columns:
+centre of the trunk; hips FL, FR, RL, RR; feet FL, FR, RL, RR; at 50 frames/s. A foot is
+the centre of its ball. Each run begins with a drop from .34 m, which is not part of the
+gait.
 """
 
 from pathlib import Path
@@ -22,18 +22,18 @@ HALF_SIZE = (0.19, 0.104)
 FOOT_RADIUS = 0.0155
 BODY = Body(height=(0.05, 0.4), stride=(1.3, 9.0), jump=0.35, markers=False)
 
-# It lands within 9 frames and has settled after 20, all in the 168 runs at hand.
+# In all 168 runs it lands within 9 frames and has settled after 20.
 SETTLED = 20
-# No gait lifts all four feet this high: m over the ground, lowest point.
+# Height of the lowest foot that no gait reaches, m.
 AIRBORNE = 0.05
 
 
 def read_solo8(
     path: Path, start: int | None, end: int | None, fps: float | None
 ) -> Recording:
-    """Reads a simulated run, of use from where it has settled after the drop.
+    """Reads a simulated run, usable from where it has settled after the drop.
 
-    Toes are the lowest points of the feet's balls. Without ``fps`` it has 50.
+    Toes are the lowest points of the feet's balls. The default rate is 50.
 
     Raises:
         InputError: if the file is not of this format, or ``start`` in the drop.
@@ -53,7 +53,7 @@ def read_solo8(
 
 
 def _landing(lowest: Array) -> int:
-    """Returns the first frame in which a foot is down; 0 without a drop before it."""
+    """Returns the first frame with a foot on the ground; 0 if there is no drop."""
     if lowest[0] < AIRBORNE:
         return 0
     landed = lowest < FOOT_RADIUS / 2

@@ -1,9 +1,8 @@
-"""Which recordings are for training and which for validation: one split for all.
+"""The split of recordings into training and validation sets, shared by all commands.
 
-Motion is split by who or what was recorded, never by window: all recordings of one
-horse are on one side, and so are all stretches of a file, which can overlap. The split
-is that of a whole data folder, whatever part of it is used, and is written into each
-Motion's provenance.
+Recordings are split by subject, never by window: all recordings of one horse are in one
+set, and so are all stretches of a file, which can overlap. The split is computed for a
+whole data folder and stored in the provenance of each Motion.
 """
 
 from collections import defaultdict
@@ -24,14 +23,14 @@ SHARE = 0.3
 class Split:
     """The split of a data folder.
 
-    The subjects (animals, or recordings where the animal is not known) of validation
-    are those that bring its shares of the fifteen labels nearest to :data:`SHARE`, by
-    the sum of squares: subjects in random order change sides as long as that helps. No
-    label loses its last subject from training.
+    Subjects are animals, or recordings if the animal is unknown. Those of the
+    validation set bring its shares of the fifteen labels nearest to :data:`SHARE` in
+    the sum of squares: subjects in random order change sides as long as that reduces
+    it. Each label keeps at least one subject in training.
 
     Args:
-        segments: all of the data folder; those of other labels only follow.
-        seed: of the order.
+        segments: all of the data folder; those of other labels follow their subject.
+        seed: seed of the order.
     """
 
     def __init__(self, segments: Iterable[Segment], seed: int = 0) -> None:
@@ -56,7 +55,7 @@ class Split:
         self._validation = frozenset(held)
 
     def side(self, segment: Segment) -> str:
-        """Returns TRAIN or VALIDATION; a subject that is not known trains."""
+        """Returns TRAIN or VALIDATION; unknown subjects are in training."""
         return VALIDATION if segment.subject in self._validation else TRAIN
 
 

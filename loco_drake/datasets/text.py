@@ -1,4 +1,4 @@
-"""Tables of numbers in plain text: many forms are read, none is guessed at."""
+"""Reader of numeric tables in text files, strict and without guessing."""
 
 import re
 import warnings
@@ -15,7 +15,7 @@ MAX_BYTES = 50_000_000
 # No coordinate, angle or time of a recording is this large, in any unit.
 LARGEST = 1e7
 
-# The marks that spreadsheets put before a text, and what they say of it.
+# Byte order marks and their encodings.
 _MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 _DECIMAL_COMMA = re.compile(r'\d,\d+"?[;\s]\s*"?[-+]?\d+,\d|"[-+]?\d+,\d')
 

@@ -1,8 +1,8 @@
-"""Walking on a treadmill undone: where the animal would be on the ground.
+"""Removes the treadmill: the path that the animal would have on the ground.
 
-Hooves in stance stand on the belt, so the trunk moves over it with minus their velocity
-relative to the trunk. Only positions relative to the trunk are used: what a file says
-of the trunk's own way may be the treadmill's frame or somebody's estimate of the belt.
+Hooves in stance stand on the belt, so the trunk moves over it with their negated
+velocity relative to the trunk. Only positions relative to the trunk are used, since the
+trunk's own path in a file may be in the treadmill's frame or an estimate of the world.
 """
 
 import numpy as np
@@ -14,20 +14,20 @@ from loco_drake.common.errors import InputError
 
 Array = NDArray[np.float64]
 
-# A marker this near to its lowest heights may be of a hoof in stance, m.
+# Candidates for stance are markers this near to their lowest heights, m.
 LOW = 0.02
 LOW_PERCENTILE = 5.0
-# ... and is if it moves no faster than this over the belt, m/s. In a trot the trunk's
-# speed varies by .4 m/s, so the first pass, which knows its mean alone, is tolerant.
+# They are in stance if they are not faster than this over the belt, m/s. In a trot the
+# trunk's speed varies by .4 m/s, so the first pass, which uses its mean, is tolerant.
 NEAR = (0.5, 0.3, 0.2)
-# In this time after landing and before lift-off a hoof slides or tips over, s.
+# Time after touchdown and before lift-off in which a hoof slides or rolls, s.
 EDGE_SECONDS = 0.02
 # Of the trunk's velocity, Hz: the fifth harmonic of a trot's steps is noise.
 CUTOFF = 8.0
 
 
 def trunk_path(trunk: Array, hooves: Array, fps: float) -> Array:
-    """Returns the horizontal way of the trunk over the belt, from the origin.
+    """Returns the horizontal path of the trunk over the belt, from the origin.
 
     Args:
         trunk: position of a marker on the trunk in any frame in m, shape (T, 3).
@@ -50,8 +50,8 @@ def trunk_path(trunk: Array, hooves: Array, fps: float) -> Array:
 def trunk_velocity(relative: Array, heights: Array, fps: float) -> Array:
     """Returns the trunk's horizontal velocity over the belt in m/s, shape (T, 2).
 
-    It is minus the mean relative velocity of the hooves in stance, interpolated through
-    the flight phases, where nothing pushes the trunk, and smoothed.
+    It is the negated mean relative velocity of the hooves in stance, interpolated
+    through flight phases, in which nothing propels the trunk, and smoothed.
 
     Args:
         relative: horizontal positions of the hooves to the trunk, shape (T, 4, 2).

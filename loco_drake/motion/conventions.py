@@ -1,10 +1,10 @@
-"""Whether a motion keeps to the conventions of Motion: measured, not trusted.
+"""Checks by measurement whether a motion follows the conventions of Motion.
 
-A wrong unit, order or frame contradicts the rest of the data: velocities are those of
-the positions, feet stand on the ground and do not move while they do, joints stay
-within the limits of the robot. What contradicts is refused with the reason; nothing is
-guessed. Motions that this project writes are further from each bound than a factor of
-ten, but for joint speeds, which reach a fifth.
+A wrong unit, order or frame contradicts the rest of the data: velocities are
+derivatives of positions, feet stand still on the ground in stance, and joints stay
+within the limits of the robot. A contradiction is refused with its reason; nothing is
+guessed. Motion that this project writes is within a tenth of each bound, except that
+joint speeds reach a fifth.
 """
 
 from dataclasses import replace
@@ -27,15 +27,15 @@ from loco_drake.motion.quality import toe_trajectories
 
 Array = NDArray[np.float64]
 
-MIN_FRAMES = 3  # of which velocities can be told
+MIN_FRAMES = 3  # needed for velocities
 MAX_DISTANCE = 1e4  # m from the world's origin
 MAX_BASE_SPEED = 10.0  # m/s
 MAX_TURNING = 30.0  # rad/s
-MAX_JOINT_SPEED = 5.0  # times the joint's limit; what is too fast will be slowed down
+MAX_JOINT_SPEED = 5.0  # times the joint's limit; the smoother slows down excess
 JOINT_MARGIN = 0.2  # rad beyond the limits
 GROUND_MARGIN = 0.1  # stand heights from the lowest sole to the ground
-STANCE_SPEED = 0.01  # m/s of standing toes, from which on other readings are tried
-MAX_UNKNOWN_JOINT_SPEED = 200.0  # rad/s, of a robot whose limits are not known
+STANCE_SPEED = 0.01  # m/s of toes in stance; above, other conventions are tried
+MAX_UNKNOWN_JOINT_SPEED = 200.0  # rad/s, for a robot with unknown limits
 
 _DOUBT = 0.2  # of what is rounding
 _TINY = 1e-9
@@ -121,7 +121,7 @@ def _check_joints(motion: Motion, robot: Robot) -> None:
 def _check_speeds(
     robot: Robot | None, base: Array, turning: Array, joints: Array
 ) -> None:
-    """Checks velocities (N, 3), (N, 3) and (N, J) for what no robot does."""
+    """Raises InputError if velocities (N, 3), (N, 3) or (N, J) are implausible."""
     most: Array = np.full(joints.shape[1], MAX_UNKNOWN_JOINT_SPEED)
     if robot is not None:
         most = MAX_JOINT_SPEED * robot.joint_speed_limits
@@ -138,11 +138,10 @@ def _check_speeds(
 
 
 def _check_velocities(motion: Motion) -> None:
-    """Compares velocities with central differences, but for the first and last frame.
+    """Compares velocities with central differences, without the first and last frame.
 
-    Any estimate of a velocity is like the speeds nearby: no deviation may be half as
-    large as the highest speed, nor half as large as the speeds in root mean square.
-    Smaller ones are in doubt where another convention explains most of them.
+    No deviation may reach half of the highest speed, nor half of the RMS speed. Smaller
+    deviations are refused if another convention explains most of them.
     """
     fps, q = motion.fps, quat_continuous(motion.base_quaternion)
     xyzw = quat_continuous(motion.base_quaternion[:, [3, 0, 1, 2]])
@@ -253,7 +252,7 @@ def _check_feet(motion: Motion, robot: Robot) -> None:
 
 
 def stance_speed(motion: Motion, robot: Robot) -> float:
-    """Returns the median speed in m/s of toes that contacts say stand; 0 if none do."""
+    """Returns the median speed in m/s of toes in contact; 0 if there are none."""
     p_WF = toe_trajectories(motion, robot)
     speeds = np.linalg.norm(np.diff(p_WF, axis=0), axis=-1) * motion.fps
     standing = speeds[motion.contacts[1:] & motion.contacts[:-1]]
@@ -261,7 +260,7 @@ def stance_speed(motion: Motion, robot: Robot) -> float:
 
 
 def _other_readings(motion: Motion) -> dict[str, Motion]:
-    """Returns the motion as it would be if a convention were another."""
+    """Returns the motion as read under other conventions."""
     q = motion.base_quaternion
     readings = {
         "with quaternions x, y, z, w": replace(

@@ -1,4 +1,4 @@
-"""Which gait is done when: one all the time, or several one after the other."""
+"""A schedule of gaits over time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ SYNTAX = "such as dog-pace,dog-trot@3,dog-gallop@6"
 
 @dataclass(frozen=True)
 class GaitSchedule:
-    """Gaits one after the other; written ``dog-pace,dog-trot@3,dog-gallop@6``.
+    """Consecutive gaits, written ``dog-pace,dog-trot@3,dog-gallop@6``.
 
     Attributes:
-        labels: the gaits, in the order in which they are done.
-        starts: when each begins, in s; the first is 0, later ones are later.
+        labels: the gaits in order.
+        starts: start time of each gait in s, ascending from 0.
     """
 
     labels: tuple[GaitLabel, ...]
@@ -31,12 +31,12 @@ class GaitSchedule:
         return ",".join([str(self.labels[0]), *(f"{k}@{t:g}" for k, t in later)])
 
     def at(self, times: Sequence[float] | NDArray[np.float64]) -> NDArray[np.int64]:
-        """Returns the index into LABELS at each of ``times`` (N,), in s from 0 on."""
+        """Returns the index into LABELS at each of ``times`` (N,), s."""
         place = np.searchsorted(self.starts, np.asarray(times), side="right") - 1
         return np.array([label.index for label in self.labels])[place]
 
     def check_ends_by(self, duration: float) -> None:
-        """Raises InputError if a gait begins only when ``duration`` s are over."""
+        """Raises InputError if a gait starts only after ``duration`` s."""
         if self.starts[-1] >= duration:
             raise InputError(
                 f"{self.labels[-1]} is to begin at {self.starts[-1]:g} s, but changes "
@@ -45,7 +45,7 @@ class GaitSchedule:
 
 
 def parse_schedule(text: str) -> GaitSchedule:
-    """Returns the schedule written as ``text``: a gait label, or several with times.
+    """Returns the schedule written as ``text``: a label, or several with start times.
 
     Raises:
         InputError: if a label is unknown, or a time is missing, not a number, or not

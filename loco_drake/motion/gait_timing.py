@@ -1,23 +1,20 @@
-"""Rhythm of a gait, from the geometry of trunk and toes alone.
+"""Gait timing from the geometry of trunk and toes.
 
-The same definitions hold for an animal's keypoints and for a robot's kinematics; all
-are unchanged where every length is scaled by one factor. With x the fore-aft position
-of a toe ahead of the trunk, along the trunk's heading:
+The same definitions hold for an animal's keypoints and for a robot's kinematics, and do
+not depend on scale. x is the fore-aft position of a toe relative to the trunk, along
+the trunk's heading.
 
-Stride period
-    The lag T of the first high peak of the correlation between the four x(t) and the
-    four x(t + T), up to half of the clip, refined by a parabola through the peak and
-    its neighbours. It is told only of a clip that is three such strides long (fewer
-    where that is asked for).
-Phase lag
-    How far a toe's cycle is behind that of RL, as a share of the stride, 0 to 1: the
-    difference of the phases of the fundamentals of their x(t), which are fitted by
-    least squares together with two harmonics and a straight line.
-Duty factor
-    The share of whole strides in which a toe is down: from one frame to the next its
-    sole is lower than 6 % of the stance height in both and moves, over the ground, at
-    less than half of the trunk's mean speed (or half a stance height per second, where
-    that is more). So a toe that hovers or skates along with the trunk is never down.
+Stride period     The lag T of the first high peak of the correlation between the four
+x(t) and the     four x(t + T), up to half of the clip, refined by a parabola through
+the peak and     its neighbours. It is undefined for a clip shorter than three strides
+(or fewer, if     so requested). Phase lag     The lag of a toe's cycle behind that of
+RL as a share of the stride, 0 to 1: the     difference between the phases of the
+fundamentals of x(t), fitted by least squares     together with two harmonics and a
+straight line. Duty factor     The share of whole strides in which a toe is down. It is
+down between two frames if     its sole is lower than 6 % of the stance height in both
+and its speed over the ground     is below half of the trunk's mean speed, or below half
+a stance height per second if     that is more. A toe that hovers or moves along with
+the trunk is never down.
 """
 
 from dataclasses import dataclass
@@ -37,8 +34,8 @@ Array = NDArray[np.float64]
 REFERENCE_LEG = LEGS.index("RL")
 MIN_STRIDES = 3
 
-# A peak counts as high from this share of the highest on; noise can raise the one at
-# two strides above the first. Below the second value a clip has no rhythm.
+# A peak is high from this share of the highest; noise can raise the peak at two strides
+# above the first. A clip without a peak above the second value has no rhythm.
 _HIGH_PEAK = 0.85
 _LOWEST_PEAK = 0.5
 _HARMONICS = 3
@@ -49,7 +46,7 @@ _DOWN_SPEED = 0.5  # stance heights per second
 
 @dataclass(frozen=True)
 class Track:
-    """Trunk and soles over time, of an animal or a robot.
+    """Trunk and soles of an animal or robot over time.
 
     Attributes:
         fps: frames per second.
@@ -76,7 +73,7 @@ class Track:
 
 @dataclass(frozen=True)
 class GaitTiming:
-    """The rhythm of a clip; definitions above.
+    """Gait timing of a clip; see the definitions above.
 
     Attributes:
         stride_period: s.
@@ -90,11 +87,11 @@ class GaitTiming:
 
 
 def clip_track(clip: KeypointClip, stance_height: float) -> Track:
-    """Returns the track of an animal: its trunk lies between withers and hip.
+    """Returns the track of an animal; its trunk is midway between withers and hip.
 
     Args:
         clip: ground at z = 0.
-        stance_height: what is scaled to the robot's, m.
+        stance_height: stance height of the animal, m.
     """
     spine = clip.withers - clip.hip
     middle = (clip.withers + clip.hip) / 2
@@ -108,7 +105,7 @@ def clip_track(clip: KeypointClip, stance_height: float) -> Track:
 
 
 def motion_track(motion: Motion, robot: Quadruped) -> Track:
-    """Returns the track of a robot's motion, by its kinematics."""
+    """Returns the track of a robot's motion."""
     soles = toe_trajectories(motion, robot) - [0.0, 0.0, robot.foot_radius]
     return Track(
         fps=motion.fps,
@@ -120,7 +117,7 @@ def motion_track(motion: Motion, robot: Quadruped) -> Track:
 
 
 def gait_timing(track: Track, strides: int = MIN_STRIDES) -> GaitTiming | None:
-    """Returns the rhythm of a track, None if it holds fewer than ``strides``."""
+    """Returns the gait timing of a track; None if it has fewer than ``strides``."""
     period = stride_period(track, strides)
     if period is None:
         return None
@@ -128,7 +125,7 @@ def gait_timing(track: Track, strides: int = MIN_STRIDES) -> GaitTiming | None:
 
 
 def stride_period(track: Track, strides: int = MIN_STRIDES) -> float | None:
-    """Returns the stride period in s, None without ``strides`` of one rhythm."""
+    """Returns the stride period in s; None if there are fewer than ``strides``."""
     signals = track.fore_aft
     lags = (len(signals) - 1) // 2
     correlation = np.array([_correlation(signals, lag) for lag in range(lags + 2)])
@@ -141,13 +138,13 @@ def stride_period(track: Track, strides: int = MIN_STRIDES) -> float | None:
     before, top, after = correlation[peak - 1 : peak + 2]
     vertex = (before - after) / (2 * (before - 2 * top + after))
     period = float(peak + vertex)
-    # A hair's grace for a clip of just as many strides.
+    # Tolerance for a clip of exactly this many strides.
     enough = len(signals) - 1 >= strides * period - 0.5
     return period / track.fps if enough else None
 
 
 def phase_lags(track: Track, period: float) -> Array:
-    """Returns each toe's lag behind RL as a share of the stride, shape (4,)."""
+    """Returns the phase lag of each toe behind RL, shape (4,)."""
     time = np.arange(len(track.soles)) / track.fps
     angles = 2 * np.pi * np.outer(time / period, np.arange(1, _HARMONICS + 1))
     line = np.stack((np.ones_like(time), time / time[-1]), axis=-1)
@@ -159,7 +156,7 @@ def phase_lags(track: Track, period: float) -> Array:
 
 
 def duty_factors(track: Track, period: float) -> Array:
-    """Returns the share of whole strides in which each toe is down, shape (4,)."""
+    """Returns the duty factor of each toe over whole strides, shape (4,)."""
     speed = _speed(track.soles[..., :2], track.fps)
     trunk_speed = float(_speed(track.trunk, track.fps).mean())
     slow = speed < max(

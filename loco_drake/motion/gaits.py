@@ -1,4 +1,4 @@
-"""The gait labels: where a motion comes from and how its feet fall."""
+"""Gait labels: the source of a motion and its gait."""
 
 from dataclasses import dataclass
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from loco_drake.common.errors import check_choice, check_name
 
-# What shipped networks have an input for. Not a list of what there may be: any other
-# source or gait has no input of its own, so that these never change.
+# Sources and gaits with an input of their own in the shipped networks. Others are valid
+# too but share OTHER, so these tuples never change.
 SOURCES = ("dog", "horse", "mpc", "solo8")
 GAITS = ("pace", "trot", "gallop", "walk", "bound", "crawl", "stilt", "wave")
 OTHER = "other"
@@ -33,7 +33,7 @@ class GaitLabel:
 
     @property
     def index(self) -> int:
-        """Row of :data:`ONE_HOT`; what networks and plans store."""
+        """Row of :data:`ONE_HOT`, which networks and plans store."""
         source = self.source if self.source in SOURCES else OTHER
         gait = self.gait if self.gait in GAITS else OTHER
         return ROW_LABELS.index(GaitLabel(source, gait))
@@ -51,7 +51,7 @@ LABELS = tuple(
     for gait in gaits
 )
 
-# What the rows of ONE_HOT stand for: the fifteen, then all other pairs.
+# Labels of the rows of ONE_HOT: the fifteen, then all other pairs.
 ROW_LABELS = LABELS + tuple(
     label
     for source in (*SOURCES, OTHER)
@@ -72,7 +72,7 @@ ONE_HOT_SIZE = ONE_HOT.shape[1]
 
 
 def any_label(text: str) -> GaitLabel:
-    """Returns the label written as ``text``, of any source and gait.
+    """Returns the label written as ``text``, for any source and gait.
 
     Raises:
         InputError: if it is not two names with a hyphen between.

@@ -1,4 +1,4 @@
-"""Motion of any four-legged source as six points in space."""
+"""Motion of any four-legged source as six keypoints."""
 
 from dataclasses import dataclass, replace
 
@@ -14,8 +14,8 @@ from loco_drake.motion.gaits import GaitLabel
 class KeypointClip:
     """Withers, hip and four toes over time, in metres, Z up, X forward.
 
-    The ground is the plane z = 0 and the clip starts heading along +x. These are what
-    :mod:`loco_drake.retargeting` needs of an animal or robot and all that it gets.
+    The ground is the plane z = 0 and the clip starts heading along +x. This is the only
+    input of :mod:`loco_drake.retargeting`.
 
     Attributes:
         source: name of the animal or robot, such as dog; need not be a known one.
@@ -24,7 +24,7 @@ class KeypointClip:
         withers: position of the withers, shape (T, 3).
         hip: position of the hip (top of the pelvis), shape (T, 3).
         toes: positions of the toes, shape (T, 4, 3), legs FL, FR, RL, RR.
-        provenance: where the frames come from, as text (file, frames, licence, ...).
+        provenance: origin of the frames as text (file, frames, licence, ...).
     """
 
     source: str

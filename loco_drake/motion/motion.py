@@ -18,7 +18,7 @@ from loco_drake.models.legs import (
 from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.keypoints import mirrored_provenance
 
-FPS = 50.0  # the rate of every Motion that this project writes, and of the policy
+FPS = 50.0  # rate of every Motion written by this project, and of the policy
 
 UNITS = {
     "base_position": "m, p_WB",
@@ -40,7 +40,7 @@ class Motion:
 
     Attributes:
         robot: name of the robot, as in :func:`loco_drake.models.robots.get_robot`.
-        source: what the motion was recorded of, such as dog.
+        source: origin of the motion, such as dog.
         gait: name of the gait.
         fps: frames per second.
         joint_names: names of the J joints.
@@ -51,9 +51,9 @@ class Motion:
         base_angular_velocity: w_WB_W in rad/s, shape (T, 3).
         joint_velocities: rad/s, shape (T, J).
         contacts: whether each foot is on the ground, bool, shape (T, 4).
-        provenance: where the motion comes from, as text.
-        gait_changes: where the gait changes on the way: first frame and label of each
-            gait, the first at frame 0; empty if ``label`` holds throughout.
+        provenance: origin of the motion as text.
+        gait_changes: first frame and label of each gait, the first at frame 0; empty
+            if there is only one gait.
     """
 
     robot: str
@@ -107,7 +107,7 @@ class Motion:
         """Returns the motion reflected in the plane y = 0 (left for right).
 
         Raises:
-            InputError: unless the robot has three joints a leg, like Go2 and A1.
+            InputError: unless the robot has three joints per leg, as Go2 and A1.
         """
         if len(self.joint_names) != len(MIRROR_JOINTS):
             raise InputError(
@@ -165,7 +165,7 @@ def make_motion(
 
 
 def _check(motion: Motion) -> None:
-    """Raises InputError, in one sentence, unless ``motion`` is sound."""
+    """Raises InputError unless ``motion`` is valid."""
     check_name("robot", motion.robot)
     GaitLabel(motion.source, motion.gait)  # checks the names
     starts = [start for start, _ in motion.gait_changes]

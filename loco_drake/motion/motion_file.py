@@ -1,4 +1,4 @@
-"""Motion files: an ``.npz`` of arrays with a JSON header. The one way in and out."""
+"""Reads and writes Motion files: an ``.npz`` of arrays with a JSON header."""
 
 import json
 import math
@@ -23,7 +23,7 @@ _FLOATS = (("f", 4), ("f", 8))
 
 
 def save_motion(motion: Motion, path: Path) -> None:
-    """Writes ``motion`` to a ``.npz`` that describes itself, wholly or not at all."""
+    """Writes ``motion`` to a self-describing ``.npz``, atomically."""
     path = Path(path)
     if path.suffix != ".npz":
         raise InputError(f"A Motion file must be named *.npz, not {quoted(path.name)}.")
@@ -47,16 +47,16 @@ def save_motion(motion: Motion, path: Path) -> None:
 
 
 def load_motion(path: Path) -> Motion:
-    """Reads a Motion file. Every command and every function reads them by this one.
+    """Reads a Motion file and checks it; all commands and functions use this reader.
 
-    Joints that are in another order than the robot's are put in that order, which is
-    said on stderr and in the provenance.
+    Joints in another order than the robot's are reordered, which is reported on stderr
+    and in the provenance.
 
     Raises:
         InputError: if the file is missing, damaged, of a newer schema, or fails a
             check of :class:`Motion` or :func:`.conventions.check_conventions`.
     """
-    # It loads Drake, which --help and what only writes need not wait for.
+    # It imports Drake, which --help and writers do not need.
     from loco_drake.motion.conventions import check_conventions, in_robot_order
 
     path = Path(path)

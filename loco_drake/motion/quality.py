@@ -1,7 +1,7 @@
-"""How good a motion is, from its geometry alone: one definition for each number.
+"""Metrics of a motion from its geometry, each with one definition.
 
-Every figure is computed from joint angles and trunk poses by the robot's kinematics,
-never from contact labels, so that it means the same for a motion from anywhere.
+All are computed from joint angles and trunk poses by the robot's kinematics and never
+from contact labels, so they are comparable for motion of any origin.
 """
 
 import numpy as np
@@ -13,9 +13,9 @@ from loco_drake.motion.motion import Motion
 
 Array = NDArray[np.float64]
 
-# A toe sphere whose lowest point is this near to the ground stands on it, m.
+# A toe sphere with its lowest point this near to the ground is in stance, m.
 STANCE_HEIGHT = 0.010
-# Rounding of the files and the solver is no violation of a limit, rad.
+# Tolerance for rounding in files and solver, rad.
 _LIMIT_TOLERANCE = 1e-6
 
 
@@ -31,9 +31,8 @@ def toe_trajectories(motion: Motion, robot: Quadruped) -> Array:
 def stance_slip_speeds(p_WF: Array, foot_radius: float, fps: float) -> Array:
     """Returns the horizontal speed in m/s of each toe in each step of its stance.
 
-    A toe is in stance where the lowest point of its sphere is within 10 mm of the
-    ground in two consecutive frames (sunk deeper counts too); the speed is that between
-    the two.
+    A toe is in stance if the lowest point of its sphere is within 10 mm of the ground,
+    or below it, in two consecutive frames. The speed is that between these frames.
 
     Args:
         p_WF: centres of the toe spheres in m, shape (T, 4, 3).
@@ -57,19 +56,19 @@ def stance_slip_median(p_WF: Array, foot_radius: float, fps: float) -> float | N
 
 
 def penetration_max(p_WF: Array, foot_radius: float) -> float:
-    """Returns how deep the lowest point of any toe sphere sinks, in m, at least 0."""
+    """Returns the largest depth of a toe sphere below the ground, m, at least 0."""
     return float(max(0.0, foot_radius - p_WF[..., 2].min()))
 
 
 def joint_limit_violations(joints: Array, robot: Quadruped) -> int:
-    """Returns how many angles of ``joints`` (T, J) lie outside the position limits."""
+    """Returns the number of ``joints`` (T, J) outside the position limits."""
     below = joints < robot.joint_lower - _LIMIT_TOLERANCE
     above = joints > robot.joint_upper + _LIMIT_TOLERANCE
     return int((below | above).sum())
 
 
 def joint_speed_ratio_max(joints: Array, robot: Quadruped, fps: float) -> float:
-    """Returns the highest joint speed over its limit: 1 is just allowed.
+    """Returns the highest ratio of joint speed to its limit; up to 1 is valid.
 
     Speeds are those between consecutive frames of ``joints`` (T, J).
     """
@@ -78,10 +77,10 @@ def joint_speed_ratio_max(joints: Array, robot: Quadruped, fps: float) -> float:
 
 
 def toes_in_place_share(joints: Array, robot: Quadruped) -> float:
-    """Returns the share of frames in which the worst toe is where its name says.
+    """Returns the share of frames in which the toes are in place, for the worst toe.
 
-    A left toe is left of the trunk's middle, a right one right of it, and a front toe
-    ahead of the rear one on its side.
+    A left toe is in place left of the trunk's midline, a right toe right of it, and a
+    front toe ahead of the rear toe on its side.
     """
     p_BF = robot.toe_positions(joints)
     beside = p_BF[..., 1] * np.array([1.0, -1.0, 1.0, -1.0]) > 0
@@ -90,5 +89,5 @@ def toes_in_place_share(joints: Array, robot: Quadruped) -> float:
 
 
 def distance_rmse(a: Array, b: Array) -> float:
-    """Returns the root of the mean squared Euclidean distance of points (..., 3)."""
+    """Returns the root mean square Euclidean distance of points (..., 3), m."""
     return float(np.sqrt(((a - b) ** 2).sum(axis=-1).mean()))

@@ -1,4 +1,4 @@
-"""Many recordings -> many Motion files."""
+"""Retargeting of many recordings to Motion files, in parallel."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -23,13 +23,13 @@ from loco_drake.retargeting.trajectories import Stretch
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one segment: a file and a report, or an error.
+    """The result of retargeting one segment: a file and a report, or an error.
 
     Attributes:
         segment: the stretch of a recording.
-        path: of the Motion file, whether written or not.
-        report: None if it failed.
-        error: why it failed, one sentence; None if it did not.
+        path: path of the Motion file, whether written or not.
+        report: None on failure.
+        error: reason of the failure as a sentence, else None.
     """
 
     segment: Segment
@@ -39,7 +39,7 @@ class Outcome:
 
 
 class SegmentRetargeter:
-    """Retargets one segment after the other, with one solver.
+    """Retargets segments one by one with one solver.
 
     Args:
         robot: to move.
@@ -77,7 +77,7 @@ class SegmentRetargeter:
         except InputError as error:
             return str(error)
         except (ArithmeticError, LookupError, RuntimeError, ValueError) as error:
-            # Whatever a solver or a table breaks on is the fault of this clip alone.
+            # A failure of a solver or table concerns this clip only.
             return f"{type(error).__name__}: {error}"
 
 
@@ -129,7 +129,7 @@ def retarget_segments(
 
 
 def stretches_of(outcomes: Iterable[Outcome], split: Split) -> list[Stretch]:
-    """Returns what was retargeted, as trajectories are cut from it."""
+    """Returns the retargeted stretches from which trajectories can be cut."""
     return [
         Stretch(
             path=outcome.path,

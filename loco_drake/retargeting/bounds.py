@@ -1,8 +1,8 @@
-"""What the figures of a retargeted clip may be before somebody should look at it.
+"""Bounds of the figures of a retargeted clip, outside which it should be inspected.
 
 They come from the 347 stretches of dog, horse, MPC and Solo8 on Go2, A1 and the robot
-of examples/solo8.yaml, none of which is outside: the bound of a figure is the worst of
-them with some room, or what is asked of all motion where that is more.
+of examples/solo8.yaml, all of which are inside. A bound is the worst of them with a
+margin, or the requirement on all motion if that is wider.
 """
 
 from collections.abc import Mapping
@@ -18,14 +18,14 @@ class Bound:
     """The range of one figure of a :class:`.retarget.RetargetReport`.
 
     Attributes:
-        name: of the figure, in words.
-        low: least value.
-        high: highest value; with ``stances``, over the robot's stance height.
-        unit: of what is printed.
+        name: name of the figure in messages.
+        low: smallest value.
+        high: largest value; with ``stances``, over the robot's stance height.
+        unit: unit in messages.
         factor: from the figure to that unit.
-        planar_high: highest value for robots whose legs cannot be put aside, and so
-            have fewer than three joints: their toes follow each sway of the trunk.
-        stances: whether lengths are bounded relative to the robot's stance height.
+        planar_high: largest value for robots with fewer than three joints per leg,
+            whose toes follow each lateral sway of the trunk.
+        stances: whether lengths are relative to the robot's stance height.
     """
 
     name: str
@@ -71,7 +71,7 @@ BOUNDS = {
 
 
 def outside_bounds(figures: Mapping[str, Any], robot: Quadruped) -> tuple[str, ...]:
-    """Returns a sentence for each figure that is outside its bound.
+    """Returns a sentence for each figure outside its bound.
 
     Args:
         figures: by key of :data:`BOUNDS`; None is not judged.

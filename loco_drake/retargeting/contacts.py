@@ -1,4 +1,4 @@
-"""Which toes of a recording are on the ground."""
+"""Contact detection: which toes of a recording are on the ground."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from loco_drake.retargeting.source_config import ContactConfig
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-# The trunk's speed, against which that of a toe is judged, changes no faster than this.
+# Cut-off of the trunk's speed, to which a toe's speed is compared, Hz.
 _TRUNK_SPEED_HZ = 1.0
 
 
@@ -19,9 +19,9 @@ def detect_contacts(clip: KeypointClip, height: float, config: ContactConfig) ->
     """Returns which toes are on the ground, by height and speed, with hysteresis.
 
     A toe lands when it is low *and* slow, and leaves when it is high *or* fast; the
-    thresholds to leave are the wider ones. Speeds are measured against the trunk's,
-    since a dog's paw rolls faster in a gallop than in a walk. Contacts and flights too
-    short to be real are then removed.
+    thresholds for leaving are wider. Speeds are relative to the trunk's, since a dog's
+    paw rolls faster in a gallop than in a walk. Short contacts and flights are removed
+    as noise.
 
     Args:
         clip: the recording, ground at z = 0.

@@ -1,20 +1,19 @@
-"""Targets near the formula's that a robot can follow.
+"""Correction of the formula's targets so that a robot can follow them.
 
-Toes stand still in stance and swing above the ground; trunk and toes move smoothly; the
-trunk is high enough for the legs to fold and for the knees to clear the ground.
+Toes stand still in stance and swing above the ground, trunk and toes move smoothly, and
+the trunk is high enough for legs to fold and knees to clear the ground.
 
-*Toes.* For each leg, the trajectory nearest to the formula's whose third differences
-are small, such that the toe does not move while it is in contact. The place where a
-foot stands and the way in which it swings there are so found together, and neither
-touchdown nor lift-off has a jump:
+*Toes.* For each leg, the result is the trajectory nearest to the formula's with small
+third differences and a fixed position in each contact. Footholds and swings are
+optimized together, so touchdown and lift-off are smooth:
 
     min  sum_t |p_t - target_t|^2 + w |D p|^2
     s.t. p_t = p_(t+1) within each contact;  p_t,z = foot_radius in contact;
          p_t,z >= foot_radius + clearance_t in swing.
 
-*Trunk.* A robot whose knees all point backward cannot copy a low crawl of one whose
-knees point at each other: a foot far ahead of its hip takes the knee to the ground. So
-the trunk is raised where legs would fold too much or kneel.
+*Trunk.* A robot whose knees all point backward cannot copy the low crawl of one whose
+knees point at each other: a foot far ahead of its hip would put the knee on the ground.
+The trunk is raised where legs would fold too much or kneel.
 """
 
 from dataclasses import replace
@@ -63,9 +62,9 @@ def correct(
 ) -> Targets:
     """Returns targets at 50 Hz that a robot can follow, near to the formula's.
 
-    Trunk and toes move smoothly, toes in contact stand still on the ground, those that
-    swing stay above it, none is nearer or further than its leg reaches, and the trunk
-    is high enough for the legs to fold and the knees to clear the ground.
+    Trunk and toes move smoothly, toes in contact stand still on the ground, swing toes
+    stay above it, all toes are within reach, and the trunk is high enough for legs to
+    fold and knees to clear the ground.
     """
     smoothing = config.smoothing
     targets = Targets(
@@ -78,9 +77,9 @@ def correct(
 
 
 def within_reach(targets: Targets, robot: Quadruped) -> Targets:
-    """Returns ``targets`` with toes that the joints' limits do not allow moved nearer.
+    """Returns ``targets`` with toes moved within reach of the joint limits.
 
-    How is the robot's own affair, see :mod:`loco_drake.models.quadruped`.
+    See :meth:`loco_drake.models.quadruped.Quadruped.reachable_toes`.
     """
     p_BF = targets.p_BF
     reachable = robot.reachable_toes(p_BF)
@@ -101,10 +100,11 @@ def difference_matrix(frames: int) -> csc_matrix:
 
 
 def penalty(cutoff: float, fps: float) -> float:
-    """Returns the weight of squared third differences that halves ``cutoff`` Hz.
+    """Returns the weight of squared third differences for a cut-off in Hz.
 
-    min |x - y|^2 + w |D x|^2 is the low-pass filter 1 / (1 + w (2 sin(pi f / fps))^6):
-    a Butterworth's shape, without its phase. Above half the rate nothing is smoothed.
+    min |x - y|^2 + w |D x|^2 is the low-pass filter 1 / (1 + w (2 sin(pi f / fps))^6),
+    like a Butterworth filter without phase; it halves the amplitude at the cut-off. A
+    cut-off above half the rate disables it.
     """
     if cutoff >= fps / 2:
         return 0.0
@@ -114,8 +114,8 @@ def penalty(cutoff: float, fps: float) -> float:
 def smooth(values: Array, cutoff: float, fps: float) -> Array:
     """Returns ``values`` (T, ...) after a zero-phase low-pass along the first axis.
 
-    Whittaker's smoother: the trajectory nearest to ``values`` whose third differences
-    are small, see :func:`penalty`. Quadratics pass unchanged, also at the ends.
+    This is Whittaker's smoother, see :func:`penalty`. Quadratics pass unchanged, also
+    at the ends.
     """
     frames = len(values)
     D = difference_matrix(frames)
@@ -152,10 +152,10 @@ def plant_feet(
 
 
 def swing_clearance(contact: Bools, fps: float) -> Array:
-    """Returns how far over the ground a toe must swing, in m, shape (T,).
+    """Returns the minimum height of a swinging toe over the ground, m, shape (T,).
 
-    Zero in contact and at the ends of each swing, :data:`CLEARANCE` at mid-swing if the
-    swing is long enough; the clip's ends count as mid-swing.
+    It is zero in contact and at the ends of each swing, and :data:`CLEARANCE` at
+    mid-swing if the swing is long enough. The clip's ends count as mid-swing.
     """
     clearance = np.zeros(len(contact))
     for start, end in intervals(~contact):
@@ -179,7 +179,7 @@ def _fit_ground_plane(target: Array, contact: Bools, smoothness: csc_matrix) -> 
 
 
 def _starts_new_value(contact: Bools) -> Bools:
-    """Returns where a value differs from the frame before: not within a contact."""
+    """Returns where a value may differ from the frame before."""
     new = np.ones(len(contact), dtype=bool)
     new[1:] = ~(contact[1:] & contact[:-1])
     return new
@@ -210,9 +210,9 @@ def _fit_height(
 
 
 def raise_trunk(targets: Targets, robot: Quadruped, fps: float) -> Targets:
-    """Returns ``targets`` with the trunk raised where the legs ask for it.
+    """Returns ``targets`` with the trunk raised where the legs need it.
 
-    That is where a hip is so low that a leg under it could not fold enough, or a knee
+    This is where a hip is so low that a leg below it could not fold enough, or a knee
     is lower than :data:`KNEE_CLEARANCE`. Heading, pitch and toes are kept; the trunk
     rises and sinks gently.
     """
@@ -244,8 +244,8 @@ def _hip_and_knee_heights(targets: Targets, robot: Quadruped) -> tuple[Array, Ar
 def _gentle_envelope(values: Array, ramp: int) -> Array:
     """Returns a smooth curve that is nowhere below ``values`` (T,).
 
-    The means are taken over no more frames than the maximum before them, so each of the
-    values that are averaged is at least that of the frame in the middle.
+    The moving averages are no wider than the preceding moving maximum, so each averaged
+    value is at least the value of the middle frame.
     """
     half = ramp // 2
     envelope: Array = maximum_filter1d(values, 4 * half + 1, mode="nearest")

@@ -1,4 +1,4 @@
-"""Pictures and figures of one recording: is it what its name says?"""
+"""Plots and figures of one recording, to check its label."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ClipSummary:
-    """What a clip shows; rhythm as defined in :mod:`loco_drake.motion.gait_timing`.
+    """Figures of a clip; see :mod:`loco_drake.motion.gait_timing`.
 
     Attributes:
         frames: of the clip.

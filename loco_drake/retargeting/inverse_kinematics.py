@@ -1,4 +1,4 @@
-"""Joint angles for given toes, by Drake's InverseKinematics."""
+"""Joint angles for toe positions, by Drake's InverseKinematics."""
 
 from typing import NamedTuple
 
@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 
 # Toes are placed within a box of this half width, m.
 TOLERANCE = 1e-5
-# Weight of joint motion against toe error where the toes cannot be reached: 1 rad from
-# the frame before counts as much as a millimetre.
+# Weight of joint motion against toe error if the toes are out of reach: 1 rad from the
+# previous frame costs as much as 1 mm.
 _REST = 1e-3
 
 
@@ -25,7 +25,7 @@ class Solution(NamedTuple):
 
     Attributes:
         joints: rad, shape (T, J).
-        solved: in which frames the solver says that they are right, shape (T,).
+        solved: in which frames the solver succeeded, shape (T,).
     """
 
     joints: Array
@@ -33,12 +33,11 @@ class Solution(NamedTuple):
 
 
 class LegSolver:
-    """Solves frame after frame of one robot, each starting from the one before.
+    """Solves the frames of one robot in order, each starting from the one before.
 
     The trunk is fixed, so targets are positions in the trunk frame B. The program is
-    built once: bounds and costs are all that change. Solving it finds joints within
-    ``TOLERANCE`` of the targets, within the position limits, and as near to the frame
-    before as the speed limits ask.
+    built once; only bounds and costs change. Its solution has the toes within
+    ``TOLERANCE`` of the targets and the joints within the limits of position and speed.
 
     Attributes:
         options: of the solver.
@@ -46,7 +45,7 @@ class LegSolver:
 
     def __init__(self, robot: Quadruped, fps: float):
         self._robot = robot
-        # A hair inside the limits, since the solver may end a hair outside its bounds.
+        # A margin, since the solver may slightly exceed its bounds.
         self._step = 0.999 * robot.joint_speed_limits / fps
         self._plant = MultibodyPlant(time_step=0.0)
         robot.AddModel(Parser(self._plant))
@@ -80,10 +79,10 @@ class LegSolver:
     def solve(self, p_BF: Array) -> Solution:
         """Returns joints (T, J) in rad for toes ``p_BF`` (T, 4, 3) in m.
 
-        Where a toe cannot be reached within the limits of position and speed, it is
-        put as near to its target as they allow. Where the solver finds no such joints
-        either, they are the best of what it ended with, of the robot's own
-        :meth:`~.Quadruped.nearest_joints` and of the frame before.
+        A toe out of reach within the limits of position and speed is put as near to its
+        target as possible. If the solver fails there too, the result is the best of its
+        last iterate, the robot's :meth:`~.Quadruped.nearest_joints` and the previous
+        frame.
         """
         joints = np.empty((len(p_BF), len(self._order)))
         solved = np.ones(len(p_BF), dtype=bool)
@@ -127,7 +126,7 @@ class LegSolver:
     def _solve_nearly(
         self, p_BF: Array, previous: Array, lower: Array, upper: Array
     ) -> tuple[bool, Array]:
-        """Minimises the toes' distances; built anew, since it is rarely needed."""
+        """Minimizes the toe distances; built anew, since it is rarely needed."""
         ik = InverseKinematics(self._plant, with_joint_limits=False)
         prog, q = ik.prog(), ik.q()[self._order]
         world = self._plant.world_frame()

@@ -1,4 +1,4 @@
-"""One recording of an animal -> one Motion of a robot."""
+"""Retargeting of one recording of an animal to one Motion of a robot."""
 
 import time
 from dataclasses import asdict, dataclass, replace
@@ -31,7 +31,7 @@ from loco_drake.retargeting.source_config import RetargetConfig, load_config
 
 @dataclass(frozen=True)
 class RetargetReport:
-    """How well one clip was retargeted, see :mod:`loco_drake.motion.quality`.
+    """Quality of one retargeted clip, see :mod:`loco_drake.motion.quality`.
 
     Attributes:
         frames: of the motion.
@@ -87,7 +87,7 @@ def retarget_clip(
     solver: LegSolver | None = None,
     variant: Variant = AS_RECORDED,
 ) -> tuple[Motion, RetargetReport]:
-    """Returns ``clip`` as a motion of ``robot`` at 50 Hz, and how good it is.
+    """Returns ``clip`` as a motion of ``robot`` at 50 Hz, and a report on its quality.
 
     Args:
         clip: at any rate.

@@ -97,11 +97,11 @@ class Targets:
 
 
 def on_feet(clip: KeypointClip) -> NDArray[np.bool_]:
-    """Returns in which frames the animal is on its feet, shape (T,).
+    """Returns in which frames the animal stands on its feet, shape (T,).
 
-    There withers and hip are both nearly as high as they are far from their toes, the
-    legs are not folded, and the trunk is neither on the ground nor steep. An animal
-    that sits has its hip low, one that lies its legs folded or beside it.
+    In these, withers and hip are about as high as they are far from their toes, the
+    legs are not folded, and the trunk is neither on the ground nor steep. A sitting
+    animal has a low hip; a lying one has its legs folded or to the side.
     """
     front = np.linalg.norm(clip.toes[:, :2] - clip.withers[:, None], axis=-1).mean(1)
     rear = np.linalg.norm(clip.toes[:, 2:] - clip.hip[:, None], axis=-1).mean(1)
@@ -119,7 +119,7 @@ def on_feet(clip: KeypointClip) -> NDArray[np.bool_]:
 
 
 def track_width(clip: KeypointClip) -> float:
-    """Returns how far left of the right toes the left ones are on average, m."""
+    """Returns the mean lateral distance of the left toes from the right ones, m."""
     ahead = (clip.withers - clip.hip)[:, :2]
     left = np.stack((-ahead[:, 1], ahead[:, 0]), axis=-1)
     left = left / np.maximum(np.linalg.norm(left, axis=-1, keepdims=True), 1e-9)
@@ -128,7 +128,7 @@ def track_width(clip: KeypointClip) -> float:
 
 
 def frames_on_feet(clip: KeypointClip, standing: NDArray[np.bool_]) -> str:
-    """Returns those frames in the numbers of the recording, such as "240-420"."""
+    """Returns these frames as numbers of the recording, such as "240-420"."""
     first = int(clip.provenance.get("frames", "0").split("-")[0])
     runs = [f"{first + start}-{first + end}" for start, end in intervals(standing)]
     if len(runs) > _MOST_RUNS:
@@ -177,7 +177,7 @@ def resample(clip: KeypointClip, fps: float) -> KeypointClip:
         raise InputError(f"A clip needs at least 4 frames, not {len(clip)}.")
     duration = (len(clip) - 1) / clip.fps
     old = np.arange(len(clip)) / clip.fps
-    # A hair's grace, so that a duration of whole steps keeps its last frame.
+    # A tolerance, so that a duration of whole steps keeps its last frame.
     new = np.arange(int(duration * fps + 1e-6) + 1) / fps
     withers, hip, toes = (
         CubicSpline(old, points)(new) for points in (clip.withers, clip.hip, clip.toes)
@@ -193,8 +193,8 @@ def scale_to_robot(
     Args:
         clip: ground at z = 0.
         height: the animal's stance height H in m.
-        robot: whose trunk and toes.
-        config: of the clip's source.
+        robot: the robot.
+        config: configuration of the clip's source.
     """
     alpha = robot.stand_height / height
     trunk = clip.withers - clip.hip
@@ -220,7 +220,7 @@ def scale_to_robot(
 
 @dataclass(frozen=True)
 class Variant:
-    """What is to be changed of a recording; by default nothing.
+    """Changes to a recording; none by default.
 
     Attributes:
         mirror: whether left and right are exchanged.
@@ -232,11 +232,11 @@ class Variant:
 
     @property
     def suffix(self) -> str:
-        """What tells a folder of such motion from others: "-mirrored-froude"."""
+        """Suffix of a folder with such motion: "-mirrored-froude"."""
         return "-mirrored" * self.mirror + "-froude" * self.froude
 
     def time_scale(self, scale: float) -> float:
-        """Returns how long the motion lasts, over the recording.
+        """Returns the duration of the motion over that of the recording.
 
         Args:
             scale: the robot's stance height over the animal's.
@@ -244,7 +244,7 @@ class Variant:
         return sqrt(scale) if self.froude else 1.0
 
     def apply(self, clip: KeypointClip, scale: float) -> KeypointClip:
-        """Returns the clip in the robot's time, mirrored where that is asked for."""
+        """Returns the clip in the robot's time, mirrored if requested."""
         clip = clip.mirrored() if self.mirror else clip
         return in_time(clip, self.time_scale(scale))
 
@@ -253,7 +253,7 @@ AS_RECORDED = Variant()
 
 
 def in_time(clip: KeypointClip, time_scale: float) -> KeypointClip:
-    """Returns the clip with a clock on which it lasts ``time_scale`` times as long."""
+    """Returns the clip on a clock that makes it ``time_scale`` times as long."""
     return replace(
         clip,
         fps=clip.fps / time_scale,
@@ -262,7 +262,7 @@ def in_time(clip: KeypointClip, time_scale: float) -> KeypointClip:
 
 
 def smoothing_in_time(config: RetargetConfig, time_scale: float) -> RetargetConfig:
-    """Returns the configuration with the cut-offs of that clock, in Hz."""
+    """Returns the configuration with its cut-offs in Hz on that clock."""
     smoothing = replace(
         config.smoothing,
         base=config.smoothing.base / time_scale,

@@ -1,4 +1,4 @@
-"""What retargeting needs to know of an animal: one short YAML file for each."""
+"""Retargeting configuration of a source, a short YAML file."""
 
 from dataclasses import dataclass, field
 from math import isfinite
@@ -13,7 +13,7 @@ _FOLDER = Path(__file__).parent / "sources"
 
 @dataclass(kw_only=True)
 class ContactConfig:
-    """When a toe is on the ground; see :mod:`loco_drake.retargeting.contacts`."""
+    """Contact thresholds; see :mod:`loco_drake.retargeting.contacts`."""
 
     # A toe lands below the first height and leaves above the second, both as fractions
     # of the stance height.
@@ -42,7 +42,7 @@ class SmoothingConfig:
 
 @dataclass(kw_only=True)
 class RetargetConfig:
-    """How the keypoints of one source become targets for a robot."""
+    """Parameters that map the keypoints of one source to targets of a robot."""
 
     # The source's stance height in m, where all its clips are of one body that may
     # creep or stand tall. Without it, it is clip by clip this percentile of the height

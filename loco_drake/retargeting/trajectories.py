@@ -1,8 +1,8 @@
 """Short trajectories of equal length, cut from retargeted stretches.
 
-They are what experiments compare, as in the paper (Section IV): 2 s each, a few for
-each label, none overlapping another, from the middle of the stretches, on the side of
-the split that their recording is on. Models train on the whole stretches instead.
+Experiments compare them, as in the paper (Section IV): 2 s each, a few per label,
+without overlap, from the middle of the stretches, in the set of their recording. Models
+train on the whole stretches instead.
 """
 
 from collections import Counter
@@ -25,10 +25,9 @@ VALIDATION_SHARE = 0.4
 
 
 def trajectories(motion: Motion, seconds: float = SECONDS) -> list[Motion]:
-    """Cuts a motion into as many stretches of ``seconds`` as it holds.
+    """Cuts a motion into as many trajectories of ``seconds`` as it holds.
 
-    They follow one upon the other in the middle of the motion; what is too much is
-    left over in equal parts at its ends.
+    They are consecutive and centred; the remainder is left over at both ends.
 
     Raises:
         InputError: if ``seconds`` is less than two frames.
@@ -55,7 +54,7 @@ def cut(motion: Motion, start: int, size: int) -> Motion:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A retargeted stretch of a recording, as far as cutting it asks.
+    """A retargeted stretch of a recording, as needed for cutting trajectories.
 
     Attributes:
         path: of its Motion file.
@@ -98,11 +97,10 @@ def choose_windows(
 ) -> list[Window]:
     """Returns up to ``count`` windows for each of the fifteen labels.
 
-    No two overlap in a recording. Every stretch offers the window in its middle first;
-    only where that does not make ``count`` do stretches offer two, three, ... side by
-    side. Two fifths are of the validation side, as far as it has as many, the
-    others of the training side; subjects take turns. Where one side has too few, the
-    other makes up for it.
+    No two overlap in a recording. Every stretch first offers the window in its middle;
+    if these are fewer than ``count``, stretches offer two, three, ... side by side. Two
+    fifths are from the validation set if available, the others from the training set,
+    with subjects in turn. If one set has too few, the other fills up.
 
     Args:
         stretches: of any labels; those that are not among the fifteen are passed over.
@@ -133,10 +131,10 @@ def choose_windows(
 
 
 def write_trajectories(windows: Sequence[Window], folder: Path) -> list[Path]:
-    """Writes ``folder/LABEL-NUMBER.npz`` for each window; returns the paths.
+    """Writes ``folder/LABEL-NUMBER.npz`` for each window and returns the paths.
 
-    Files that are left of a larger number of trajectories of the same labels are
-    removed: they may overlap the new ones, or be on the other side of the split.
+    Removes surplus files of the same labels from earlier runs, which may overlap the
+    new ones or be in the other set.
     """
     folder = Path(folder)
     paths: list[Path] = []
