@@ -1,9 +1,9 @@
-"""Motion as a sequence of feature vectors that say nothing of place and heading.
+"""Features: motion as vectors that do not depend on position and heading.
 
 A frame is described relative to the one before it, in its heading frame H: z up, x
-along the trunk's heading, half-way between the headings of the two frames. Lengths
-are in units of the robot's stand height, so that features of one robot make sense to
-another of like proportions.
+along the trunk's heading, midway between the headings of the two frames. Lengths are in
+units of the robot's stand height, so features transfer between robots of similar
+proportions.
 """
 
 import numpy as np
@@ -29,8 +29,7 @@ SIZE = 22
 def motion_features(robot: Robot, motion: Motion) -> Array:
     """Returns the features of ``motion``, shape (T, SIZE).
 
-    The first frame has none before it: its velocity and yaw rate are those of the
-    second.
+    The first frame has the velocity and yaw rate of the second.
 
     Raises:
         InputError: if the motion is of another robot or not at FPS.
@@ -55,9 +54,9 @@ def motion_features(robot: Robot, motion: Motion) -> Array:
 
 
 def integrate_path(robot: Robot, features: Array, pose: Array) -> Array:
-    """Returns the path of the base that features describe.
+    """Returns the base's path for given features.
 
-    The exact inverse of the differences in :func:`motion_features`.
+    This is the exact inverse of the differences in :func:`motion_features`.
 
     Args:
         robot: gives the unit of length.

@@ -1,9 +1,9 @@
-"""Feet that stay where they land, and never below the ground.
+"""Foot locking: stance feet stay where they land, and no foot is below the ground.
 
-A decoder's base speed and leg angles never agree to the last millimetre, and what is
-left is a foot that slides. Here a foot in contact is held where it landed, the base's
-path is drawn towards where the standing feet say that it is, and what a swinging foot
-is off by fades away. Every frame depends on the ones before it only.
+Base velocity and joint angles from a decoder never agree exactly, and the difference
+appears as sliding feet. Here a foot in contact is held at its foothold, the base's path
+is corrected toward the position implied by the stance feet, and the offset of a swing
+foot decays. Every frame depends on earlier ones only.
 """
 
 from dataclasses import dataclass
@@ -19,24 +19,24 @@ from loco_drake.motion.motion import FPS
 
 Array = NDArray[np.float64]
 
-BASE_GAIN = 0.05  # share of the standing feet's mean offset that the base takes over
-BASE_EASE = 0.15  # share of that shift's change that is made in a frame: no jolts
-SWING_DECAY = 0.8  # of a swinging foot's offset, a frame
-SETTLING = 0.5  # share of its height over the ground that a standing foot loses
-REACH = 0.06  # m, a foot that would have to be moved farther slides
+BASE_GAIN = 0.05  # share of the stance feet's mean offset that moves the base
+BASE_EASE = 0.15  # low-pass factor of this shift per frame
+SWING_DECAY = 0.8  # of a swing foot's offset, per frame
+SETTLING = 0.5  # share of its height that a stance foot loses per frame
+REACH = 0.06  # m, largest offset of a foot; beyond it, the foot slides
 TOUCHING, LIFTING = 0.55, 0.45  # probabilities at which a contact begins and ends
 
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """Where base and feet are after a frame, for B motions side by side.
+    """State of base and feet after a frame, for B motions.
 
     Attributes:
         pose: x, y in m and yaw in rad of the base, shape (B, 3).
-        shift: by how much the feet moved the base in the frame, m, shape (B, 2).
-        anchor: where each foot landed, x and y in m, shape (B, 4, 2).
-        offset: by how much each toe is moved in W, in m, shape (B, 4, 3).
-        contacts: which feet stand, shape (B, 4).
+        shift: displacement of the base by the feet in the frame, m, shape (B, 2).
+        anchor: foothold of each foot, x and y in m, shape (B, 4, 2).
+        offset: displacement of each toe in W, m, shape (B, 4, 3).
+        contacts: feet in stance, shape (B, 4).
     """
 
     pose: Array
@@ -47,7 +47,7 @@ class Footing:
 
 
 def start_footing(pose: Array) -> Footing:
-    """Returns the footing of a base at ``pose`` (B, 3) with no foot down yet."""
+    """Returns the footing of a base at ``pose`` (B, 3) without contacts."""
     batch = len(pose)
     return Footing(
         pose=pose,
@@ -96,7 +96,7 @@ def step_footing(
         wanted = anchor - toes
         size = np.sqrt((wanted * wanted).sum(axis=-1, keepdims=True))
         held = wanted * np.minimum(1.0, REACH / np.maximum(size, REACH))
-        # The base goes where the standing feet on average say that it is.
+        # Move the base toward the mean position implied by the stance feet.
         weight = down[..., None] / np.maximum(down.sum(axis=1), 1)[:, None, None]
         wish = BASE_GAIN * (held * weight).sum(axis=1)
         shift = shift + BASE_EASE * (wish - shift)
@@ -132,7 +132,7 @@ def _toes(robot: Robot, features: Array) -> Array:
 def _move_toes(robot: Robot, q: Array, offset: Array) -> Array:
     """Returns q with the toes moved by ``offset`` in W, and none below the ground.
 
-    Where a leg cannot be folded far enough for that, the base is raised.
+    The base is raised where a leg cannot fold far enough.
     """
     q_WB, p_WB = q[..., None, :4], q[..., None, 4:7]
     p_WF = quat_rotate(q_WB, robot.toe_positions(q[..., 7:])) + p_WB + offset
@@ -147,6 +147,6 @@ def _move_toes(robot: Robot, q: Array, offset: Array) -> Array:
 
 
 def _reach(robot: Robot, q_WB: Array, p_WB: Array, p_WF: Array) -> tuple[Array, Array]:
-    """Returns joints within their limits, and where the toes are then."""
+    """Returns joints within their limits, and the resulting toe positions."""
     joints = robot.nearest_joints(quat_rotate(quat_conjugate(q_WB), p_WF - p_WB))
     return joints, quat_rotate(q_WB, robot.toe_positions(joints)) + p_WB

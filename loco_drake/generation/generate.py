@@ -1,4 +1,4 @@
-"""Whole motions from a motion model."""
+"""Generation of whole motions with a motion model."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ from loco_drake.motion.motion import FPS, Motion
 
 Integers = NDArray[np.int64]
 
-# Label of a motion that changes its gait on the way.
+# Label of a motion with several gaits.
 SEVERAL = GaitLabel("several", "gaits")
 LONGEST_DURATION = 600.0  # s
 
@@ -28,7 +28,7 @@ def generate_motions(
     top_p: float = 0.95,
     speed_rank: float | None = None,
 ) -> list[Motion]:
-    """Generates one motion for each seed, side by side.
+    """Generates one motion for each seed, in one batch.
 
     Args:
         model: from
@@ -98,7 +98,7 @@ def generate_motions(
 def chunk_labels(model: MotionModel, schedule: GaitSchedule, chunk: int) -> Integers:
     """Returns the labels of the tokens of a chunk, shape (model.chunk_tokens,).
 
-    A token is of the gait that is due when its first frame is.
+    A token has the gait that is scheduled at its first frame.
 
     Args:
         model: writes the chunk.

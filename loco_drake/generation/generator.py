@@ -1,8 +1,8 @@
-"""A GPT that writes tokens of motion for a gait, a speed and a duration.
+"""The generator: a GPT over motion tokens for a gait, a speed and a duration.
 
-One transformer step per token. The codes of a token's codebooks are drawn one after the
-other by small heads that see the transformer's output and the codes drawn so far,
-as residual codebooks refine one another.
+The transformer takes one step per token. Small heads sample the codes of a token's
+codebooks in order, each given the transformer's output and the codes sampled so far, as
+residual codebooks refine one another.
 """
 
 import math
@@ -27,15 +27,15 @@ SHORTEST, LONGEST = 0.5, 16.0  # s
 
 @dataclass(frozen=True)
 class GeneratorConfig:
-    """What is needed to build a :class:`Generator`.
+    """Sizes of a :class:`Generator`.
 
     Attributes:
-        tokenizer: fingerprint of the tokenizer whose codes it writes.
-        codebooks: how many of that tokenizer's codebooks it writes, the coarsest first.
+        tokenizer: fingerprint of the tokenizer.
+        codebooks: number of its codebooks to predict, the coarsest first.
         codebook_size: codes in a codebook.
         frames_per_token: frames that a token stands for.
         labels: names of the gait labels it was trained on.
-        window: earlier tokens that it looks at when a chunk begins.
+        window: tokens of context at the start of a chunk.
         width: channels.
         layers: transformer blocks.
         heads: attention heads.
@@ -61,7 +61,7 @@ Cache = list[tuple[Tensor, Tensor]]
 
 
 class Block(nn.Module):
-    """A transformer block: attention, then a layer of its own for each time.
+    """A transformer block: attention, then a feed-forward layer.
 
     Args:
         config: its sizes.
@@ -90,11 +90,10 @@ class Block(nn.Module):
 
 
 class Generator(nn.Module):
-    """The GPT over tokens, conditioned at every step on label, speed and duration.
+    """A GPT over tokens, conditioned at every step on label, speed and duration.
 
-    Step t is given the codes of token t - 1 and the condition of token t, and
-    predicts the codes of token t. A code of ``codebook_size`` stands for "nothing
-    before": the start of a sequence.
+    Step t takes the codes of token t - 1 and the condition of token t, and predicts the
+    codes of token t. The code ``codebook_size`` marks the start of a sequence.
 
     Args:
         config: its sizes.
@@ -138,7 +137,7 @@ class Generator(nn.Module):
         duration: Tensor,
         cache: Cache | None = None,
     ) -> tuple[Tensor, Cache]:
-        """Returns what the heads are given, shape (B, T, width), and a cache.
+        """Returns the input of the heads, shape (B, T, width), and a cache.
 
         Args:
             before: codes of the token before each step, shape (B, T, codebooks).
@@ -172,7 +171,7 @@ class Generator(nn.Module):
         return logits
 
     def drawn(self, codebook: int, codes: Tensor) -> Tensor:
-        """Returns what the heads of later codebooks are told of codes (...)."""
+        """Returns the embedding of sampled codes (...) for later heads."""
         told: Tensor = self.earlier_books(
             codes + codebook * (self.config.codebook_size + 1)
         )
@@ -210,7 +209,7 @@ class Generator(nn.Module):
         temperature: float,
         top_p: float,
     ) -> Tensor:
-        """Returns the codes (B, n, codebooks) of n tokens that go on from ``history``.
+        """Samples the codes (B, n, codebooks) of n tokens that continue ``history``.
 
         Args:
             history: codes of the H >= 0 tokens before, shape (B, H, codebooks).
@@ -219,9 +218,9 @@ class Generator(nn.Module):
                 (B, n).
             speed_bins: of the sequence, shape (B, 1).
             duration: bin of the sequence's duration, shape (B,).
-            uniforms: the dice, in [0, 1), shape (B, n, codebooks).
-            temperature: divides the logits; 0 takes the likeliest code.
-            top_p: only the likeliest codes that together reach it can be drawn.
+            uniforms: random numbers in [0, 1), shape (B, n, codebooks).
+            temperature: divides the logits; 0 is greedy.
+            top_p: sample from the likeliest codes that together reach it.
         """
         batch, steps, codebooks = uniforms.shape
         if history.shape[1] == 0:
@@ -249,7 +248,7 @@ class Generator(nn.Module):
 
 
 def draw(logits: Tensor, uniforms: Tensor, temperature: float, top_p: float) -> Tensor:
-    """Draws codes (B,) by nucleus sampling (Holtzman et al. 2020).
+    """Samples codes (B,) by nucleus sampling (Holtzman et al. 2020).
 
     Args:
         logits: shape (B, N).
@@ -270,14 +269,14 @@ def draw(logits: Tensor, uniforms: Tensor, temperature: float, top_p: float) -> 
 
 
 def duration_bin(seconds: NDArray[np.float64] | float) -> NDArray[np.int64]:
-    """Returns the bin of durations; those past LONGEST share the last."""
+    """Returns the bin of durations; those beyond LONGEST share the last."""
     place = np.log(np.asarray(seconds) / SHORTEST) / math.log(LONGEST / SHORTEST)
     bins = np.floor(place * (DURATION_BINS - 1))
     return np.clip(bins, 0, DURATION_BINS - 1).astype(np.int64)
 
 
 def _initialize(module: nn.Module) -> None:
-    """Small normal weights, as in GPT-2 (Radford et al. 2019)."""
+    """Initializes weights as in GPT-2 (Radford et al. 2019)."""
     if isinstance(module, nn.Linear | nn.Embedding):
         nn.init.normal_(module.weight, std=0.02)
     if isinstance(module, nn.Linear) and module.bias is not None:
@@ -285,7 +284,7 @@ def _initialize(module: nn.Module) -> None:
 
 
 def save_generator(generator: Generator, path: Path, info: dict[str, Any]) -> None:
-    """Writes weights in 16 bits; ``info`` is added to the header for people."""
+    """Writes weights in 16 bits, with ``info`` for readers in the header."""
     config = {"network": asdict(generator.config), "info": info}
     save_weights(path, "generator", generator.state_dict(), config, half=True)
 

@@ -1,4 +1,4 @@
-"""Motion without end, a chunk at a time, from tokenizer and generator."""
+"""A motion model generates endless motion chunk by chunk."""
 
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -27,24 +27,24 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 CHUNK_SECONDS = 1.0
-SETTLING = 4  # frames before the first one in which feet find their ground
+SETTLING = 4  # frames before the first one, in which feet reach the ground
 
 
 @dataclass(frozen=True, eq=False)
 class Stream:
-    """Where B motions that are being generated stand. Immutable: copies are itself.
+    """Immutable state of B motions in generation; copies are the same object.
 
-    One frame is always held back: its velocity needs the frame after it.
+    One frame is held back, since its velocity needs the frame after it.
 
     Attributes:
         seeds: of each motion, shape (B,).
-        duration: how long each is to last, in s, shape (B,).
+        duration: intended duration of each, s, shape (B,).
         speed_rank: of each, in [0, 1], see :mod:`.speed_rank`, shape (B,).
-        chunk: how many times the stream was extended.
+        chunk: number of chunks so far.
         tokens: the latest ones, shape (B, n, codebooks).
         labels: of ``tokens``, index into gaits.LABELS, shape (B, n).
-        footing: of base and feet after the frame held back.
-        q: the last frame given out and the one held back, shape (B, 2, 19), or
+        footing: state of base and feet after the frame held back.
+        q: the last frame returned and the one held back, shape (B, 2, 19), or
             (B, 0, 19) before the first extension.
         contacts: of the frame held back, shape (B, 4).
     """
@@ -79,7 +79,7 @@ class Frames:
         q: R_WB as w, x, y, z, p_WB in m, joints in rad, shape (B, n, 19).
         v: w_WB_W in rad/s, v_WB_W in m/s, joints in rad/s, shape (B, n, 18); central
             differences of q.
-        contacts: which feet stand, shape (B, n, 4).
+        contacts: feet in stance, shape (B, n, 4).
         labels: index into gaits.LABELS, shape (B, n).
     """
 
@@ -89,22 +89,22 @@ class Frames:
     labels: Integers
 
     def __getitem__(self, index: int) -> "Frames":
-        """Returns those of one motion, without the first axis."""
+        """Returns the frames of one motion, without the first axis."""
         return Frames(
             self.q[index], self.v[index], self.contacts[index], self.labels[index]
         )
 
 
 class MotionModel:
-    """Tokenizer and generator as one source of motion. Never changes once made.
+    """Tokenizer and generator as one source of motion. Immutable.
 
     Args:
-        tokenizer: of the generator.
-        generator: writes the tokens.
-        robot: name of the robot; must be one that the tokenizer knows.
+        tokenizer: the tokenizer.
+        generator: a generator trained with this tokenizer.
+        robot: name of a robot that the tokenizer knows.
 
     Raises:
-        InputError: if the three do not belong together.
+        InputError: if the three do not match.
     """
 
     def __init__(self, tokenizer: Tokenizer, generator: Generator, robot: str) -> None:
@@ -121,8 +121,8 @@ class MotionModel:
             )
         self.tokenizer = tokenizer.eval()
         self.generator = generator.eval()
-        # How motions are batched changes sums in their last bits. In 64 bits that is
-        # too little to draw another code or to lift another foot.
+        # Batching changes sums in their last bits. In 64 bits this is too little to
+        # change a code or a contact.
         self._writer = deepcopy(self.generator).double()
         self._decoder = deepcopy(self.tokenizer).double()
         self.robot: Robot = get_robot(robot)
@@ -137,7 +137,7 @@ class MotionModel:
 
     @property
     def chunk_frames(self) -> int:
-        """Frames in a chunk of the usual length, about a second."""
+        """Frames per chunk, about one second."""
         return self.chunk_tokens * self.frames_per_token
 
     def start(
@@ -147,15 +147,15 @@ class MotionModel:
         pose: Array | None = None,
         speed_rank: Array | float | None = None,
     ) -> Stream:
-        """Returns a stream of B motions of which nothing is generated yet.
+        """Returns an empty stream of B motions.
 
         Args:
-            seeds: one for each motion, not negative, shape (B,). What a motion
-                becomes depends on its own seed only.
-            duration: how long the motions are to last, in s, shape (B,) or for all.
-            pose: x, y, yaw of the first frame in m and rad, shape (B, 3); default 0.
-            speed_rank: rank in [0, 1] of the speed among those at which the gait was
-                recorded, shape (B,) or for all; by default each seed has its own.
+            seeds: one for each motion, not negative, shape (B,). A motion depends only
+                on its own seed.
+            duration: intended duration, s, shape (B,) or for all.
+            pose: x, y in m and yaw in rad of the first frame, shape (B, 3); default 0.
+            speed_rank: rank in [0, 1] of the speed among the recorded speeds of the
+                gait, shape (B,) or for all; drawn for each seed by default.
         """
         seeds = np.array(seeds, dtype=np.int64)
         batch = len(seeds)
@@ -191,19 +191,19 @@ class MotionModel:
     ) -> tuple[Stream, Frames]:
         """Generates more of each motion.
 
-        The dice are named by (seed, number of the chunk), so that a stream extended
-        again in the same way gives the same frames.
+        Random numbers are functions of seed and chunk, so extending a stream again in
+        the same way gives the same frames.
 
         Args:
-            stream: as it stands; it is left alone.
+            stream: the stream, which is not modified.
             labels: index into gaits.LABELS of each motion (B,), or of each of its
                 new tokens (B, tokens).
-            tokens: how many; default ``chunk_tokens``.
-            temperature: of the generator, see :meth:`Generator.sample`.
-            top_p: of the generator, see there.
+            tokens: number of tokens; default ``chunk_tokens``.
+            temperature: see :meth:`Generator.sample`.
+            top_p: see :meth:`Generator.sample`.
 
         Returns:
-            The stream as it stands then, and ``tokens * frames_per_token`` frames.
+            The extended stream, and ``tokens * frames_per_token`` frames.
 
         Raises:
             InputError: if the weights were not trained on a label.
@@ -213,7 +213,7 @@ class MotionModel:
         labels = np.asarray(labels, dtype=np.int64)
         self.check_labels(labels)
         new = np.broadcast_to(labels.reshape(batch, -1), (batch, steps))
-        # The first tokens are only there for the decoder to look back at.
+        # The first tokens only provide context for the decoder.
         lead = 0 if stream.chunk else self._lead
         new = np.concatenate((np.repeat(new[:, :1], lead, axis=1), new), axis=1)
         shape = (lead + steps, self.generator.config.codebooks)
@@ -235,13 +235,12 @@ class MotionModel:
     def append(
         self, stream: Stream, tokens: Integers, labels: Integers
     ) -> tuple[Stream, Frames]:
-        """Decodes tokens that go on from ``stream``.
+        """Decodes tokens that continue ``stream``.
 
-        Of a stream that was never extended the frames of the first ``_lead`` tokens
-        are not given out.
+        For an empty stream, the frames of the first ``_lead`` tokens are not returned.
 
         Args:
-            stream: as it stands; it is left alone.
+            stream: the stream, which is not modified.
             tokens: shape (B, n, codebooks).
             labels: of the tokens, shape (B, n).
         """
@@ -340,7 +339,7 @@ def _velocities(q: Array) -> Array:
 
 @lru_cache
 def pretrained_motion_model(robot: str) -> MotionModel:
-    """Returns the shipped motion model for ``robot``; it is loaded once.
+    """Returns the shipped motion model for ``robot``, loaded once.
 
     Raises:
         InputError: if there are no weights for that robot.

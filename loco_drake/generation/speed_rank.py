@@ -1,8 +1,8 @@
-"""How fast a gait is done: as a rank among how fast it is done in the recordings.
+"""Speed rank: the rank of a speed among the recorded speeds of a gait.
 
-A generator that is only told the gait wanders through all speeds at which it was
-recorded. Told the rank of the speed too, it keeps to it; and a rank makes sense for
-any gait, 0 the slowest that was recorded, 1 the fastest.
+A generator conditioned on the gait alone wanders through all recorded speeds.
+Conditioned on the rank as well, it keeps its speed. A rank applies to any gait: 0 is
+the slowest recorded speed, 1 the fastest.
 """
 
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ Integers = NDArray[np.int64]
 
 BINS = 16
 SMOOTHING = 2.0  # s over which speed is averaged
-_DICE = 2**62  # where the dice for the rank lie; chunks count up from 0
+_DICE = 2**62  # index of the random numbers for the rank; chunks count from 0
 
 
 def token_speeds(features: Array, frames_per_token: int) -> Array:

@@ -1,9 +1,9 @@
-"""Long motions from short clips, by going over from one to another where they agree.
+"""Long motions assembled from short clips, with transitions where the clips agree.
 
-Recorded gallops last two seconds; a generator that only sees them never learns what
-comes after the end of one. Here motions of any length are walks in a motion graph
-(Kovar, Gleicher, Pighin 2002): clips are left and entered at frames with like poses
-and speeds, and blended over a few frames.
+Recorded gallops last two seconds, so a generator trained on them alone never learns to
+continue. Motions of any length are walks in a motion graph (Kovar, Gleicher, Pighin
+2002): they leave and enter clips at frames with similar poses and speeds, and blend
+over a few frames.
 """
 
 from collections.abc import Sequence
@@ -30,10 +30,10 @@ EVENNESS = 2.0  # cost of entering where it was played as often as on average
 
 
 class Stitcher:
-    """Makes long motions of clips of one robot and one label.
+    """Assembles long motions from clips of one robot and one label.
 
-    It remembers which frames it has played, and prefers others: otherwise clips that
-    slow down would lead from slow to slower, and all motion end there.
+    It counts how often each frame was used and prefers others. Otherwise clips that
+    slow down would lead to ever slower ones, where all motion would end.
 
     Args:
         clips: those of up to 2 BLEND + SHORTEST_STAY frames are left out.
@@ -64,7 +64,7 @@ class Stitcher:
     def __call__(self, frames: int, random: np.random.Generator) -> Array:
         """Returns the features of a motion of ``frames`` frames, shape (frames, SIZE).
 
-        It begins anywhere in a clip.
+        It starts anywhere in a clip.
         """
         row = int(random.choice(self._enterable))
         clip, frame = int(self._clip_of[row]), int(self._frame_of[row])
@@ -87,7 +87,7 @@ class Stitcher:
     def _transition(
         self, clip: int, frame: int, random: np.random.Generator
     ) -> tuple[int, tuple[int, int]]:
-        """Returns where to leave a clip that is at ``frame``, and where to go on."""
+        """Returns where to leave a clip that is at ``frame``, and where to continue."""
         earliest, latest = frame + SHORTEST_STAY, len(self._clips[clip]) - BLEND
         wished = latest
         if random.random() > TO_THE_END:
@@ -102,9 +102,9 @@ class Stitcher:
         cost = np.maximum(cost, 0.0) / a.shape[1]
         total = np.concatenate(([0.0], np.cumsum(self._played)))
         ahead = total[self._enterable + SHORTEST_STAY] - total[self._enterable]
-        # Nothing is worn out after one play: the mean is counted as one more.
+        # Add one to the mean, so that a single use counts little.
         cost += EVENNESS * ahead / (SHORTEST_STAY * (1 + self._played.mean()))
-        # To go on where one is would be no transition.
+        # Exclude transitions to the current place.
         same = self._clip_of[self._enterable] == clip
         near = np.abs(self._frame_of[self._enterable] - exits[:, None]) < SHORTEST_STAY
         cost[same & near] = np.inf
@@ -121,7 +121,7 @@ class Stitcher:
 
 
 def _described(clip: Array) -> Array:
-    """Returns pose, speeds of the joints, and the pace over a stride, (T, 33)."""
+    """Returns pose, joint speeds, and mean base velocity over a stride, (T, 33)."""
     pose, pace = clip[:, : CONTACTS.start], clip[:, :3]
     speeds = np.gradient(clip[:, JOINTS], 1 / FPS, axis=0)
     kernel = np.ones((STRIDE, 1))

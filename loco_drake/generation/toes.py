@@ -1,4 +1,4 @@
-"""Where features put the toes, in torch: the geometry that training is scored on."""
+"""Differentiable toe kinematics of features in torch, for training losses."""
 
 import torch
 from torch import Tensor, nn
@@ -15,7 +15,7 @@ from loco_drake.motion.motion import FPS
 
 
 class Toes(nn.Module):
-    """Kinematics of several robots side by side, differentiable.
+    """Differentiable kinematics of several robots in one batch.
 
     Args:
         robots: features of a batch can be of any of these, by index.
@@ -61,7 +61,8 @@ class Toes(nn.Module):
     def velocities(self, features: Tensor, p_HF: Tensor, robot: Tensor) -> Tensor:
         """Returns velocities of the toes over the ground in m/s, (B, T - 1, 4, 3).
 
-        By backward differences, in the heading frame: of a foot that stands, zero.
+        Uses backward differences in the heading frame; the velocity of a stance foot is
+        zero.
 
         Args:
             features: shape (B, T, SIZE).

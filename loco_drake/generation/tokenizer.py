@@ -1,8 +1,8 @@
-"""Motion features to tokens and back: a causal VQ-VAE with residual codebooks.
+"""The tokenizer: a causal VQ-VAE with residual codebooks over motion features.
 
 van den Oord et al. 2017 (VQ-VAE); Zeghidour et al. 2021 (residual quantization).
-How the codebooks are learned is in :mod:`loco_drake.generation.train_tokenizer`: the
-library that does it takes seconds to import, which running the networks need not.
+:mod:`loco_drake.generation.train_tokenizer` learns the codebooks; it is separate
+because the quantization library takes seconds to import.
 """
 
 import math
@@ -21,11 +21,11 @@ from loco_drake.generation.layers import ConvBlock
 
 @dataclass(frozen=True)
 class TokenizerConfig:
-    """What is needed to build a :class:`Tokenizer`.
+    """Sizes of a :class:`Tokenizer`.
 
     Attributes:
-        robots: the robots whose motion it knows; encoder and decoder are told which.
-        frames_per_token: down-sampling.
+        robots: robots of the training; encoder and decoder are conditioned on one.
+        frames_per_token: downsampling factor.
         width: channels of the hidden layers at the rate of tokens.
         depth: residual blocks at that rate, in encoder and decoder each.
         frame_width: channels of the decoder's layers at the rate of frames.
@@ -47,10 +47,10 @@ class TokenizerConfig:
 
 
 class Tokenizer(nn.Module):
-    """The VQ-VAE: encoder, residual codebooks, decoder, feature statistics.
+    """A VQ-VAE: encoder, residual codebooks, decoder, feature statistics.
 
-    Times of a token are ``frames_per_token`` frames. Encoder and decoder are causal:
-    the codes of a token depend on no later frame, and frames on no later token.
+    A token covers ``frames_per_token`` frames. Encoder and decoder are causal: codes do
+    not depend on later frames, nor frames on later tokens.
 
     Args:
         config: its sizes.
@@ -66,8 +66,8 @@ class Tokenizer(nn.Module):
         self.std: Tensor
         self.encoder_robot = nn.Embedding(len(config.robots), width)
         self.decoder_robot = nn.Embedding(len(config.robots), width)
-        # The frames of a token are put side by side, so that most of the work is
-        # done at the low rate.
+        # The frames of a token are concatenated, so that most layers run at the low
+        # rate.
         self.encoder_in = nn.Linear(SIZE * frames, width)
         self.encoder = nn.Sequential(*(ConvBlock(width) for _ in range(config.depth)))
         self.encoder_out = nn.Linear(width, config.code_size)
@@ -83,20 +83,20 @@ class Tokenizer(nn.Module):
         self.expand = nn.Linear(width, frames * config.frame_width)
         self.smooth = nn.Sequential(*smooth)
         self.decoder_out = nn.Linear(config.frame_width, SIZE)
-        # How many earlier tokens the frames of a token can depend on.
+        # Number of earlier tokens that the frames of a token can depend on.
         self.memory = sum(block.reach for block in decoder) + math.ceil(
             sum(block.reach for block in smooth) / frames
         )
 
     def set_statistics(self, features: Tensor) -> None:
-        """Takes mean and spread of the features (N, SIZE) for normalization."""
+        """Sets mean and deviation for normalization from features (N, SIZE)."""
         self.mean.copy_(features.mean(dim=0))
-        # A feature that hardly varies must not become the loudest of all.
+        # Do not amplify features that hardly vary.
         self.std.copy_(features.std(dim=0).clamp(min=0.02))
         self.mean[CONTACTS], self.std[CONTACTS] = 0.5, 0.5
 
     def embed(self, features: Tensor, robot: Tensor) -> Tensor:
-        """Returns vectors to be quantized: (B, T, SIZE) -> (B, T / f, code_size).
+        """Returns vectors to quantize: (B, T, SIZE) -> (B, T / f, code_size).
 
         Args:
             features: frames; T must be a multiple of ``frames_per_token``.
@@ -137,19 +137,19 @@ class Tokenizer(nn.Module):
         return total
 
     def decode_embedded(self, embedded: Tensor, robot: Tensor) -> Tensor:
-        """Decodes vectors (B, n, code_size); contacts come as logits."""
+        """Decodes vectors (B, n, code_size); contacts are logits."""
         x = self.decoder_in(embedded) + self.decoder_robot(robot)[:, None]
         x = self.expand(self.decoder(x))  # (B, n, frames * frame_width)
         x = x.view(x.shape[0], -1, self.config.frame_width)
         x = self.decoder_out(self.smooth(x))
-        # Logits of the contacts are left as they are, the rest back in their units.
+        # Denormalize all features except the contact logits.
         scaled = x * self.std + self.mean
         return torch.cat((scaled[..., : CONTACTS.start], x[..., CONTACTS]), dim=-1)
 
     @property
     def fingerprint(self) -> str:
-        """Short name of exactly these weights in 16 bits, as they are shipped."""
-        # By the names that fields had in the first weights.
+        """Hash of these weights in 16 bits, as they are shipped."""
+        # With the field names of the first weights.
         digest = sha256(repr(self.config).replace("codebook", "book").encode())
         for name, value in sorted(self.state_dict().items()):
             data = value.half() if value.is_floating_point() else value
@@ -158,7 +158,7 @@ class Tokenizer(nn.Module):
 
 
 def save_tokenizer(tokenizer: Tokenizer, path: Path, info: dict[str, Any]) -> None:
-    """Writes weights in 16 bits; ``info`` is added to the header for people."""
+    """Writes weights in 16 bits, with ``info`` for readers in the header."""
     config = {"network": asdict(tokenizer.config), "info": info}
     save_weights(path, "tokenizer", tokenizer.state_dict(), config, half=True)
 

@@ -1,4 +1,4 @@
-"""How well a tokenizer gives back what it was given, and how much of it is used."""
+"""Reconstruction errors and codebook usage of a tokenizer."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from loco_drake.models.robots import get_robot
 
 @dataclass(frozen=True)
 class TokenizerScore:
-    """How well a tokenizer gives back what it was given.
+    """Reconstruction errors of a tokenizer.
 
     Attributes:
         joint_rmse_rad: over frames and joints.
@@ -31,7 +31,7 @@ class TokenizerScore:
 def score_tokenizer(
     tokenizer: Tokenizer, clips: Sequence[Clip], codebooks: int | None = None
 ) -> TokenizerScore:
-    """Returns how well whole clips survive the way to tokens and back.
+    """Returns the reconstruction errors over whole clips.
 
     Args:
         tokenizer: knows the clips' robots.

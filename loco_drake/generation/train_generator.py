@@ -33,11 +33,11 @@ from loco_drake.motion.motion import FPS
 BATCH = 24  # windows
 GROWTH = 12  # tokens by which a window grows while a chunk is written
 NO_HISTORY = 0.15  # share of windows that begin a sequence
-# Long motions to learn from, on average for each robot and label: tokens depend on
-# where a motion is cut into them, so that the same clips are worth seeing many times.
+# Long training motions, on average for each robot and label. Tokens depend on where a
+# motion is divided into them, so repeated clips remain useful.
 STITCHED = 50
 STITCHED_SECONDS = 20.0  # each
-CORRUPTION = 0.1  # share of input codes replaced, so that mistakes can be mended
+CORRUPTION = 0.1  # share of input codes replaced, so that the model learns to recover
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +75,11 @@ def encode_clips(
 
 
 def stitched_clips(clips: Sequence[Clip], count: int, seed: int) -> list[Clip]:
-    """Returns long motions made of the clips, ``count`` for each robot and label.
+    """Returns long motions assembled from the clips.
 
-    How many there are of one grows with the square root of the seconds of its clips:
-    much recorded gaits are more varied.
+    There are ``count`` on average per robot and label; their number is proportional to
+    the square root of the duration of its clips, since gaits with more recordings are
+    more varied.
 
     Raises:
         InputError: if all clips of a robot and label are too short.

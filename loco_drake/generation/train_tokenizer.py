@@ -1,9 +1,8 @@
 """Training of the tokenizer on windows of clips.
 
-The codebooks follow exponential moving averages of what they stand for, and codes
-that nothing is near to are taken from the batch anew, both by
-vector-quantize-pytorch. The finest codebooks are left out at random, so that the
-decoder makes the best of the coarse ones alone.
+vector-quantize-pytorch updates the codebooks by exponential moving averages and
+replaces dead codes by samples of the batch. The finest codebooks are dropped at random,
+so that the decoder can use the coarse ones alone.
 """
 
 from collections.abc import Sequence
@@ -55,13 +54,13 @@ TOE_SPEED_SCALE = 0.5  # m/s
 
 
 class Scales:
-    """How much features vary, by label: the unit of their errors.
+    """Scales of the features by label, the units of their errors.
 
-    The trunk of a walking horse moves so evenly that, in units of what lies between a
-    walk and a gallop, any jitter of it would be free.
+    The trunk of a walking horse moves so evenly that in units of the variation between
+    gaits its jitter would have no weight.
 
     Args:
-        clips: to measure; a label that none has gets the scales of all.
+        clips: clips to measure; labels without clips get the scales of all.
     """
 
     def __init__(self, clips: Sequence[Clip]) -> None:
@@ -72,7 +71,7 @@ class Scales:
         own = {label: _variances(features) for label, features in by_label.items()}
         everything: Array = np.mean(list(own.values()), axis=0)
         table = np.stack([own.get(i, everything) for i in range(len(LABELS))])
-        # What hardly varies at all must not become the loudest of all.
+        # Do not amplify features that hardly vary.
         scales = np.sqrt(np.maximum(table, LEAST_SHARE**2 * everything))
         scales = np.maximum(scales, np.array(LEAST_SCALES)[:, None])
         self._scales = torch.tensor(scales, dtype=torch.float32)  # (labels, 3, ...)
@@ -84,14 +83,14 @@ class Scales:
 
 
 def _variances(clips: Sequence[Array]) -> Array:
-    """Returns those of (T, N) about their mean, and mean squares of changes, (3, N)."""
+    """Returns variances and mean squared first and second differences, (3, N)."""
     orders = [np.concatenate([np.diff(x, n=n, axis=0) for x in clips]) for n in (1, 2)]
     squares = [np.square(order).mean(axis=0) for order in orders]
     return np.stack((np.concatenate(clips).var(axis=0), *squares))
 
 
 class LearningTokenizer(nn.Module):
-    """A tokenizer and the quantizer that learns its codebooks.
+    """A tokenizer with the quantizer that learns its codebooks.
 
     Args:
         tokenizer: trained in place; its own codebooks are set by :meth:`finish`.
@@ -135,7 +134,7 @@ class LearningTokenizer(nn.Module):
         return output, commitment.mean()
 
     def finish(self) -> Tokenizer:
-        """Returns the tokenizer with the codebooks as they are now."""
+        """Returns the tokenizer with the current codebooks."""
         self.tokenizer.codebooks.copy_(self.quantizer.codebooks)
         return self.tokenizer.eval()
 
@@ -164,7 +163,7 @@ def train_tokenizer(
         torch.manual_seed(settings.seed)
         learning = LearningTokenizer(Tokenizer(config))
     with torch.no_grad():
-        # To begin with a still picture: first to unlearn jitter kills most codes.
+        # Start with constant output: unlearning initial jitter would kill most codes.
         learning.tokenizer.decoder_out.weight.mul_(0.01)
     frames = np.concatenate([clip.features for clip in clips])
     learning.tokenizer.set_statistics(torch.tensor(frames, dtype=torch.float32))
@@ -238,15 +237,15 @@ def tokenizer_losses(
 
 
 def energy_error(output: Tensor, target: Tensor, jitter: Tensor) -> Tensor:
-    """Returns by how much windows tremble too little or too much.
+    """Returns the error of the energy of jitter per window, in logarithmic scale.
 
-    What a token cannot tell of a tremor is its phase. The least squared error is then
-    no tremor at all; here it must be there, in any phase.
+    A token cannot encode the phase of jitter. The squared error alone would therefore
+    remove jitter; this loss requires it, in any phase.
 
     Args:
         output: features, shape (N, T, SIZE).
-        target: the same.
-        jitter: what is much, see :class:`Scales`.
+        target: features, shape (N, T, SIZE).
+        jitter: scale of jitter, see :class:`Scales`.
     """
 
     def energy(features: Tensor) -> Tensor:

@@ -1,4 +1,4 @@
-"""The loop that trains a network by gradient descent: resumable, stoppable, logged."""
+"""The training loop of a network: resumable, stoppable, logged."""
 
 import json
 import math
@@ -31,7 +31,7 @@ LossFunction = Callable[[np.random.Generator], tuple[Tensor, dict[str, float]]]
 
 @dataclass(frozen=True)
 class LoopResult:
-    """What :func:`train` did.
+    """Result of :func:`train`.
 
     Attributes:
         steps: optimizer steps taken in all, those before a resume included.
@@ -53,9 +53,8 @@ def train(
 ) -> LoopResult:
     """Trains ``module`` in place.
 
-    After Ctrl-C (or SIGTERM) the step under way is completed and a checkpoint saved.
-    A run that goes on from a checkpoint computes what the uninterrupted run would
-    have computed, to the last bit.
+    After Ctrl-C (or SIGTERM) the current step is completed and a checkpoint saved. A
+    resumed run computes what the uninterrupted run would have computed, bit for bit.
 
     Args:
         name: of checkpoint, weights and progress bar: "tokenizer", "generator", ...
@@ -130,5 +129,5 @@ def train(
 
 
 def _schedule(progress: float) -> float:
-    """Returns the learning rate as a share of the highest, ``progress`` in [0, 1)."""
+    """Returns the learning rate relative to its peak, for ``progress`` in [0, 1)."""
     return min(progress / 0.02 + 0.01, 1.0) * 0.5 * (1 + math.cos(math.pi * progress))

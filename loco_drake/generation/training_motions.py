@@ -1,4 +1,4 @@
-"""A folder of Motion files as training data."""
+"""Motion files as training data."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,12 +24,12 @@ class Clip:
 
     Attributes:
         robot: name of the robot.
-        label: what it does.
-        recording: the recording that the motion is of, and the animal if it is known;
-            clips of one can overlap and are never on both sides of the split.
+        label: gait label.
+        recording: source and animal, or recording if the animal is unknown; clips of
+            one can overlap and are always in the same set.
         features: see :mod:`loco_drake.generation.features`, shape (T, SIZE).
-        performance: file and frames, and whether mirrored: the same for all robots that
-            were given this stretch to follow; empty if nothing is known.
+        performance: file, frames and mirroring: equal for all robots to which this
+            stretch was retargeted; empty if unknown.
     """
 
     robot: str
@@ -44,7 +44,7 @@ class Clip:
 
 @dataclass(frozen=True)
 class Library:
-    """Clips to learn from and clips to test on, split by recording.
+    """Clips for training and testing, split by recording.
 
     Attributes:
         train: clips and their mirror images.
@@ -67,7 +67,7 @@ class Library:
 
     @property
     def summary(self) -> str:
-        """How much there is to train on: another library has another summary."""
+        """Size of the training data, which identifies the library."""
         frames = sum(len(clip) for clip in self.train)
         return f"{len(self.train)} clips of {frames} frames"
 
@@ -121,7 +121,7 @@ def load_library(*folders: Path) -> Library:
 
 
 def motion_clip(motion: Motion, path: str = "") -> Clip:
-    """Returns a motion as a clip; ``path`` names a recording that has no other name."""
+    """Returns a motion as a clip; ``path`` identifies a recording without a name."""
     robot = get_robot(motion.robot)
     return Clip(
         robot=motion.robot,
@@ -148,11 +148,11 @@ def _performance(motion: Motion) -> str:
 
 
 class Sampler:
-    """Draws clips so that every label is seen about equally often.
+    """Samples clips so that every label is seen about equally often.
 
-    A label is drawn with a probability that grows with the square root of its time:
-    rare gaits are seen often enough to learn, and not so often that their few clips
-    are learned by heart. Within a label a clip is drawn in proportion to its length.
+    The probability of a label grows with the square root of its duration: rare gaits
+    are seen often enough to learn, but not so often that their few clips are memorized.
+    Within a label the probability of a clip is proportional to its length.
 
     Args:
         clips: to draw from.

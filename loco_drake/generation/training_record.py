@@ -1,4 +1,4 @@
-"""What weights were trained on, in the header of their file."""
+"""The record of the training data in the header of weights."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -57,7 +57,7 @@ def read_training_record(path: Path, kind: str) -> dict[str, Any] | None:
 def seen_in_training(
     record: dict[str, Any] | None, motions: Iterable[Motion]
 ) -> list[str] | None:
-    """Returns which of the recordings of ``motions`` weights were trained on.
+    """Returns which recordings of ``motions`` the weights were trained on.
 
     Args:
         record: from :func:`read_training_record`.

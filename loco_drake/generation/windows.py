@@ -1,4 +1,4 @@
-"""Windows of clips that the tokenizer learns from."""
+"""Windows of clips for training the tokenizer."""
 
 from collections.abc import Sequence
 
@@ -14,17 +14,17 @@ from loco_drake.generation.training_motions import Clip, Sampler
 Array = NDArray[np.float64]
 
 WINDOW = 64  # frames
-TEMPO = 1.15  # windows are played at most this much faster or slower
-# Share of the windows that are frames as they are: in between, jitter is smoothed away.
+TEMPO = 1.15  # largest change of speed of a window
+# Share of the windows without interpolation, which would smooth jitter.
 EXACT = 0.5
 
 
 class PairedWindows:
-    """Draws windows of clips, each with what another robot does at the same time.
+    """Draws windows of clips, each with the same window of another robot.
 
-    A token must mean the same motion to all robots. So the tokens of a window are
-    decoded for its own robot, and for another one that was given the same stretch of
-    the same recording to follow, where there is one.
+    A token must mean the same motion for all robots. The tokens of a window are
+    therefore decoded for its own robot, and for another robot to which the same stretch
+    of the same recording was retargeted, if there is one.
 
     Args:
         clips: at least WINDOW frames each.
@@ -92,7 +92,7 @@ def draw_cut(frames: int, random: np.random.Generator) -> tuple[float, float]:
 def cut_window(curve: CubicSpline, start: float, tempo: float) -> Array:
     """Returns WINDOW frames from ``start`` on, played ``tempo`` times as fast.
 
-    Feet that stand still do so at any tempo.
+    Feet in stance remain still at any tempo.
 
     Args:
         curve: the features of a clip over its frame numbers.

@@ -1,4 +1,4 @@
-"""Many robots that follow plans, one control period at a time."""
+"""A batch of robots that track plans, one control period at a time."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,22 +19,22 @@ Array = NDArray[np.float64]
 
 
 class TrackingBatch:
-    """B robots that follow plans, one control period at a time.
+    """B robots that track plans, one control period at a time.
 
-    What is computed from the states, joint targets, observations, rewards and
-    terminations, is computed for all robots at once, by the functions that the systems
-    of the same names use: for one robot alone it would cost as much as the physics.
+    Joint targets, observations, rewards and terminations are computed for all robots at
+    once, with the functions that the systems use. For one robot at a time this would
+    cost as much as the physics.
 
     Args:
-        plans: what to follow.
-        config: of each environment.
+        plans: the plans to track.
+        config: configuration of each environment.
         count: B, the number of robots.
 
     Attributes:
         plan: index of the plan that each robot follows, shape (B,).
         start: sample of its plan that each robot started at, shape (B,).
         sample: sample of its plan that each robot is at, shape (B,).
-        penalty: what each robot's last step loses by distance and falls, (B,).
+        penalty: penalties of each robot's last step for distance and falls, (B,).
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class TrackingBatch:
         self._worlds = make_worlds(config, count)
         self._domains = [Domain()] * count
         self._lengths = np.array([len(plan) for plan in plans])
-        # All samples of all plans, one after the other, for one look-up a step.
+        # Samples of all plans concatenated, for one lookup per step.
         self._first = np.cumsum(self._lengths) - self._lengths
         self._wanted = np.concatenate([plan.state for plan in plans])
         self._set_points = np.concatenate(

@@ -1,4 +1,4 @@
-"""The Gymnasium environment: the locomotion diagram with its action port open."""
+"""The Gymnasium environment of the tracking task."""
 
 from typing import Any
 
@@ -21,22 +21,22 @@ ACTION_SPACE = gymnasium.spaces.Box(-10.0, 10.0, (12,), np.float32)
 
 
 class TrackingEnv(gymnasium.Env[Observation, Observation]):
-    """A robot that is to follow a plan, drawn at random for each episode.
+    """A robot that tracks a plan, drawn at random for each episode.
 
-    Observations are those of :mod:`loco_drake.control.observation`, actions those of
-    :class:`loco_drake.systems.control.JointTargets`, rewards the sum of
-    :func:`loco_drake.control.reward.reward_terms`, at most 1 a step, less
-    what the configuration's ``position_penalty`` and ``fall_cost`` take, by default
-    nothing. An episode starts in a state of the plan (reference state initialization,
-    Peng et al. 2018), terminates when the robot falls or loses its plan, and is
-    truncated when its time or its plan is over.
+    Observations are those of :mod:`loco_drake.control.observation` and actions those of
+    :class:`loco_drake.systems.control.JointTargets`. The reward is the sum of
+    :func:`loco_drake.control.reward.reward_terms`, at most 1 per step, minus the
+    penalties of the configuration, which are 0 by default. An episode starts in a state
+    of the plan (reference state initialization, Peng et al. 2018), terminates when the
+    robot falls or is too far from its plan, and is truncated at the end of its time or
+    plan.
 
-    ``info`` holds the reward's terms by name, and the plan and sample that the episode
-    started at. ``reset(options={"plan": i, "sample": k})`` chooses them.
+    ``info`` contains the reward terms by name, and the plan and sample at which the
+    episode started. ``reset(options={"plan": i, "sample": k})`` selects them.
 
     Args:
-        plans: what to follow.
-        config: everything else.
+        plans: the plans to track.
+        config: the configuration.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (as in Gymnasium)

@@ -1,4 +1,4 @@
-"""What a training log says of how returns grew."""
+"""The learning curve in a training log."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -15,9 +15,9 @@ _PREFIX = "return/"
 
 
 def learning_curve(log: Path, points: int = POINTS) -> dict[str, Any]:
-    """Returns the learning curve of a log that training writes, thinned.
+    """Returns the thinned learning curve of a training log.
 
-    Of runs that were resumed, which all add to one log, the seconds are summed.
+    Resumed runs append to the same log; their seconds are summed.
 
     Args:
         log: ``progress.jsonl``, a line for each batch.
@@ -53,7 +53,7 @@ def learning_curve(log: Path, points: int = POINTS) -> dict[str, Any]:
 
 
 def trim_log(log: Path, steps: int) -> None:
-    """Leaves out of a log what was learned and lost: all later than ``steps``."""
+    """Removes the entries of a log after ``steps``, which a lost run wrote."""
     if not log.exists():
         return
     kept = [text + "\n" for text, row in _sound_lines(log) if row["steps"] <= steps]
@@ -62,7 +62,7 @@ def trim_log(log: Path, steps: int) -> None:
 
 
 def _sound_lines(log: Path) -> Iterator[tuple[str, dict[str, float]]]:
-    """Yields each line with its figures; passes over half a line, or a damaged one."""
+    """Yields each line with its figures; skips incomplete and damaged lines."""
     for text in log.read_text(errors="replace").splitlines():
         with suppress(ValueError, TypeError, OverflowError):
             row = {name: float(value) for name, value in parse_json(text).items()}

@@ -1,4 +1,4 @@
-"""The policy as an ONNX file, to be run without torch and without this package."""
+"""Export of the policy as ONNX, for use without torch and this package."""
 
 import json
 import logging
@@ -67,11 +67,11 @@ def policy_metadata(actor: Actor, robot: Robot) -> dict[str, str]:
 
 
 def export_onnx(actor: Actor, robot: Robot, path: Path) -> dict[str, str]:
-    """Writes a policy as ONNX; returns its metadata.
+    """Writes a policy as ONNX and returns its metadata.
 
-    The network takes "observation" (N, OBSERVATION_SIZE) as it is observed and returns
-    "action" (N, 12), in 32 bits, for any N: normalization, clipping and the mean over
-    the observation and its mirror image are within.
+    The network maps raw observations "observation" (N, OBSERVATION_SIZE) to "action"
+    (N, 12), in 32 bits, for any N. Normalization, clipping and mirror symmetry are
+    included.
 
     Raises:
         InputError: if the packages of the extra ``onnx`` are not installed.

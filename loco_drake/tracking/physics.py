@@ -1,4 +1,4 @@
-"""Control periods of the simulated plant, in one world for all robots or in many."""
+"""Simulation of control periods, in one world for all robots or one for each."""
 
 import math
 from dataclasses import replace
@@ -72,15 +72,15 @@ class _Simulation:
 class SharedWorld(_Simulation):
     """One control period of a robot, as a function of its state and its targets.
 
-    [q, v] is all the state of the diagram, and the plant does not know the time, so
-    that one Context serves all robots: with one for each, every step would find the
-    caches of the processor filled with those of the others.
+    [q, v] is the entire state of the diagram, and the plant does not depend on time, so
+    one Context serves all robots. Separate Contexts would evict each other from the
+    processor's caches.
     """
 
     def __init__(self, config: EnvironmentConfig) -> None:
         super().__init__(config, Disturbances())
-        # The clock may run on where the steps of the plant meet the control periods to
-        # the last bit, however late it is. An integrator must forget the last robot.
+        # The clock may continue if plant steps and control periods coincide exactly at
+        # any time. An integrator must be reset for each robot.
         steps = PLAN_DT / config.plant.time_step
         power_of_2 = steps >= 1 and math.frexp(steps)[0] == 0.5
         self._runs_on = power_of_2 and config.plant.contact != "cenic"
@@ -88,7 +88,7 @@ class SharedWorld(_Simulation):
         self._simulator.Initialize()
 
     def begin(self, domain: Domain, sample: int) -> None:
-        """Does nothing: every episode's world is the model's."""
+        """Does nothing, since every episode's world is the model's."""
 
     def advance(self, state: Array, desired_state: Array) -> Array:
         """Returns the state [q, v], (37,), one control period after ``state``.
@@ -107,14 +107,14 @@ class SharedWorld(_Simulation):
 
 
 class OwnWorld(_Simulation):
-    """One robot in a world of its own, drawn anew for each of its episodes.
+    """One robot in its own world, drawn for each of its episodes.
 
-    What a world is stays in a Context, motors have a past, and pushes come at their
-    times, so that every robot needs a Context, and its clock is that of its plan.
+    A world is stored in a Context, motors have memory, and pushes depend on time, so
+    every robot needs a Context, on the clock of its plan.
     """
 
     def __init__(self, config: EnvironmentConfig) -> None:
-        # What the sensors measure is computed for all robots at once.
+        # Sensors are simulated for all robots at once.
         disturbances = replace(config.randomization.disturbances, sensors=False)
         super().__init__(config, disturbances)
         self._sample = 0
@@ -125,7 +125,7 @@ class OwnWorld(_Simulation):
         self._context.SetTime(sample * PLAN_DT)
         if self._diagram.HasSubsystemNamed("actuation"):
             actuation = self._diagram.GetSubsystemByName("actuation")
-            # The motors forget the last episode.
+            # Reset the memory of the motors.
             actuation.SetDefaultContext(
                 actuation.GetMyMutableContextFromRoot(self._context)
             )
@@ -142,7 +142,7 @@ class OwnWorld(_Simulation):
 def make_worlds(
     config: EnvironmentConfig, count: int
 ) -> list[SharedWorld] | list[OwnWorld]:
-    """Returns what simulates each of ``count`` robots; by default one for all."""
+    """Returns the simulation of each of ``count`` robots, shared by default."""
     if config.randomization.changes_physics:
         return [OwnWorld(config) for _ in range(count)]
     return [SharedWorld(config)] * count

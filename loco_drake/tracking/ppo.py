@@ -1,4 +1,4 @@
-"""Proximal policy optimization: stable-baselines3's, exactly symmetric, rate by KL."""
+"""PPO from stable-baselines3 with exact symmetry and a KL-adaptive learning rate."""
 
 from typing import Any, cast
 
@@ -24,10 +24,10 @@ from loco_drake.tracking.config import PpoConfig
 
 
 class SymmetricPolicy(ActorCriticPolicy):
-    """stable-baselines3's policy, averaged over the robot and its mirror image.
+    """Actor and critic averaged over the observation and its mirror image.
 
-    The mean action mirrors with the observation, and the value does not change with
-    it, exactly. Observations must be normalized by :class:`SymmetricStatistics`.
+    The mean action mirrors with the observation and the value is invariant, exactly.
+    Observations must be normalized by :class:`SymmetricStatistics`.
 
     Args:
         *args: as of ActorCriticPolicy.
@@ -89,18 +89,18 @@ class SymmetricStatistics(RunningMeanStd):
     """Mean and variance of observations and their mirror images."""
 
     def update(self, arr: NDArray[Any]) -> None:
-        """Takes observations (N, size) into account."""
+        """Updates the statistics with observations (N, size)."""
         super().update(np.concatenate((arr, mirror_observations(arr))))
 
 
 class AdaptivePPO(PPO):
-    """PPO whose actor learns at the rate that gives updates the target divergence."""
+    """PPO that adapts the learning rate of the actor to a target KL divergence."""
 
     target: float
     rate: float
 
     def split_optimizer(self, critic_rate: float) -> None:
-        """Gives actor and critic parameter groups of their own."""
+        """Creates separate parameter groups for actor and critic."""
         actor: list[torch.nn.Parameter] = []
         critic: list[torch.nn.Parameter] = []
         for name, parameter in self.policy.named_parameters():
@@ -112,7 +112,7 @@ class AdaptivePPO(PPO):
         self.policy.optimizer = torch.optim.Adam(groups, lr=self.rate, eps=1e-5)
 
     def train(self) -> None:
-        """Does one update, then sets the learning rate of the next."""
+        """Performs one update and adapts the learning rate."""
         super().train()
         kl = float(self.logger.name_to_value["train/approx_kl"])
         if kl > 2 * self.target:
@@ -133,7 +133,7 @@ class AdaptivePPO(PPO):
 
 
 def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
-    """Returns a learner on ``environment``, its observations normalized.
+    """Returns a learner on ``environment`` with normalized observations.
 
     Args:
         environment: what to learn in.

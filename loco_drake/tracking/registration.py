@@ -1,7 +1,7 @@
-"""``gymnasium.make("loco_drake/Tracking-v0")``.
+"""Registration of ``loco_drake/Tracking-v0`` with Gymnasium.
 
-Gymnasium knows the environment once :mod:`loco_drake` is imported; since its version 1
-there are no entry points for that. This module imports nothing else that takes time.
+Importing :mod:`loco_drake` registers the environment, since Gymnasium 1 has no entry
+points for this. This module imports nothing slow.
 """
 
 from collections.abc import Sequence
@@ -34,13 +34,13 @@ def make_tracking(
     """Returns a TrackingEnv.
 
     Args:
-        config: of the environment.
-        references: folder of Motion files to follow. Without it motion is generated
-            with the shipped weights, as the following say.
+        config: configuration of the environment.
+        references: folder of Motion files to track. If None, the shipped weights
+            generate motion as follows.
         labels: gaits to generate.
-        count: motions of each gait.
-        seconds: of each motion.
-        seed: of what is generated.
+        count: motions per gait.
+        seconds: length of each motion, s.
+        seed: seed of the generated motion.
     """
     from loco_drake.models.robots import get_robot
     from loco_drake.tracking.config import EnvironmentConfig

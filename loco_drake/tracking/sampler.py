@@ -1,4 +1,4 @@
-"""Which plan the next episode follows: more of the gaits that are still done badly."""
+"""Sampling of plans for episodes, which favours gaits with low returns."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,23 +8,22 @@ from loco_drake.motion.gaits import ROW_LABELS
 
 _MEMORY = 0.98  # weight of the past in a label's score, per episode
 _PLAN_MEMORY = 0.6  # the same of a plan's score: it is drawn seldom
-# Even a perfect gait is drawn now and then, so that it is not forgotten; and those that
-# hardly begin to work must not take the time of those that are being learned.
+# Bounds on the missing return: perfect gaits are still drawn, so that they are not
+# forgotten, and gaits without success do not take all the time.
 _LEAST, _MOST = 0.1, 0.8
 _MOST_OF_PLAN = 0.5  # within a label; a plan that nobody could follow is to be no sink
 _SHORTEST = 0.05  # share of an episode that the shortest are taken to last
 
 
 class PlanSampler:
-    """Draws labels so that they get steps for what they lack, and so a label's plans.
+    """Samples labels, and plans within a label, in proportion to their missing return.
 
-    A gait's share of the *steps*, not of the episodes, is proportional to a power of
-    the return that it lacks, within bounds: episodes that end in an early fall are
-    short, and what falls would hardly be practised otherwise. The power is the square,
-    since most of what a gait lacks in training, some ten of a hundred, is the noise of
-    the actions. The plans of a label share its steps by the same rule: a bound on the
-    spot and one at a metre a second have the same label. What has not been drawn yet
-    counts as its label does.
+    A gait's share of the *steps*, not of the episodes, is proportional to the square of
+    its missing return, within bounds. Episodes that end in an early fall are short, so
+    shares of episodes would neglect gaits that fall. The square suppresses the part of
+    the missing return that is due to action noise, about ten of a hundred. Plans share
+    the steps of their label by the same rule, since a label can contain very different
+    motion. Plans not yet drawn have the score of their label.
 
     Args:
         plans: what to draw from; the label of a plan is that of its first sample.
@@ -64,7 +63,7 @@ class PlanSampler:
         return int(self.random.choice(among, p=episodes / episodes.sum()))
 
     def record(self, plan: int, score: float, share: float) -> None:
-        """Takes note of an episode on ``plan``.
+        """Records an episode on ``plan``.
 
         Args:
             plan: index of the plan.

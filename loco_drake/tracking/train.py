@@ -1,4 +1,4 @@
-"""Training of the tracking policy: from plans to weights, resumable at any moment."""
+"""Training of the tracking policy, from plans to weights; resumable at any time."""
 
 import json
 import time
@@ -43,13 +43,13 @@ NAME = "tracker"
 POLICY = "policy.safetensors"
 
 _LAYOUT = [list(part) for part in OBSERVATION_LAYOUT]
-# What the sampler knows of labels and plans.
+# State of the sampler.
 _SCORES = ("scores", "shares", "plan_scores", "plan_shares")
 
 
 @dataclass(frozen=True)
 class Progress:
-    """What is told after each batch.
+    """Progress reported after each batch.
 
     Attributes:
         steps: environment steps so far.
@@ -72,12 +72,12 @@ def train_tracker(
     options: Mapping[str, Any] | None = None,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> dict[str, Any]:
-    """Trains a policy to follow ``plans``.
+    """Trains a policy to track ``plans``.
 
-    Writes to ``folder`` after each batch: ``checkpoint.safetensors``, with which
-    training can be resumed, ``policy.safetensors``, which the diagram loads,
-    ``progress.jsonl`` and TensorBoard logs. An interruption (Ctrl-C), or being killed,
-    loses at most the batch being collected.
+    After each batch it writes ``checkpoint.safetensors``, from which training can
+    resume, ``policy.safetensors``, which the diagram loads, ``progress.jsonl`` and
+    TensorBoard logs to ``folder``. An interruption (Ctrl-C), or being killed, loses at
+    most the current batch.
 
     Args:
         plans: what to follow.
@@ -169,7 +169,7 @@ def train_tracker(
 
 
 def _beginning(path: Path, hidden: list[int]) -> Checkpoint:
-    """Returns a checkpoint whose networks are like those to be trained."""
+    """Returns a checkpoint whose networks have the required sizes."""
     saved = read_checkpoint(path, NAME)
     with sound(path):
         own, layout = saved.run["hidden"], saved.run["observation_layout"] or _LAYOUT
@@ -205,7 +205,7 @@ def _state(learner: AdaptivePPO, sampler: PlanSampler) -> dict[str, Any]:
 
 
 def _start_from(learner: AdaptivePPO, saved: Checkpoint) -> None:
-    """Gives ``learner`` the networks and the normalizer of a checkpoint, no more."""
+    """Loads only networks and normalizer of a checkpoint into ``learner``."""
     load_module(saved, learner.policy)
     with sound(saved.path):
         statistics = learner.statistics
@@ -215,7 +215,7 @@ def _start_from(learner: AdaptivePPO, saved: Checkpoint) -> None:
 
 
 def _restore(learner: AdaptivePPO, sampler: PlanSampler, saved: Checkpoint) -> None:
-    """Puts ``learner`` and ``sampler`` where the checkpoint left them."""
+    """Restores ``learner`` and ``sampler`` from the checkpoint."""
     _start_from(learner, saved)
     restore_learning(saved, learner.policy, learner.policy.optimizer)
     with sound(saved.path):
@@ -234,7 +234,7 @@ def _restore(learner: AdaptivePPO, sampler: PlanSampler, saved: Checkpoint) -> N
 
 
 class _Saver(BaseCallback):
-    """Saves and reports after each update, and stops when asked to."""
+    """Saves and reports after each update, and stops on request."""
 
     def __init__(
         self,

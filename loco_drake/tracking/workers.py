@@ -1,4 +1,4 @@
-"""Environments in worker processes, many to a worker, as one vectorized environment."""
+"""A vectorized environment with many environments in each of several processes."""
 
 import contextlib
 import gc
@@ -18,8 +18,8 @@ from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
 from loco_drake.tracking.sampler import PlanSampler
 
-# This share of the episodes that fell or lost their plan is followed by another try,
-# from so many samples earlier, so that the moments which are failed are practised most.
+# Share of the terminated episodes that are retried from a number of samples before the
+# failure, so that difficult moments are practised most.
 _RETRIED = 0.5
 _LEAD = (25, 125)  # least and most
 
@@ -32,13 +32,13 @@ def _work(
     config: EnvironmentConfig,
     seeds: list[int],
 ) -> None:
-    """Serves one message after the other: actions and the plans to go on with."""
-    # Ctrl-C reaches the whole group; the trainer decides what becomes of it.
+    """Serves messages with actions and the plans of the next episodes."""
+    # Ctrl-C reaches the whole process group; only the trainer handles it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     use_one_thread()
     batch = TrackingBatch(plans, config, len(seeds))
     random = [np.random.default_rng(seed) for seed in seeds]
-    # What there is now stays: the garbage collector need not look through it each time.
+    # Exclude permanent objects from garbage collection.
     gc.freeze()
     try:
         while (message := pipe.recv()) is not None:
@@ -65,9 +65,9 @@ def _step(
     NDArray[np.bool_],
     list[Any],
 ]:
-    """Steps and, where episodes end, resets, as VecEnv wants it.
+    """Steps all robots and resets those whose episodes ended, as VecEnv requires.
 
-    Of the reward it returns what counts for returns, and the penalty.
+    Returns the reward without penalties and the penalties separately.
     """
     terms, terminated, truncated = batch.step(actions)
     observations = batch.observe()
@@ -157,7 +157,7 @@ class WorkerVecEnv(VecEnv):
         return np.concatenate(self._receive())
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
-        """Tells every worker what to do."""
+        """Sends actions to every worker."""
         self._send(actions)
 
     def step_wait(
