@@ -22,6 +22,16 @@ def test_links_lead_to_files(page):
             assert (page.parent / target).is_file(), target
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_modules_that_pages_name_exist(page):
+    names = re.findall(r"loco_drake((?:\.[a-z_0-9]+)+)`", page.read_text())
+    paths = [ROOT / "loco_drake" / name[1:].replace(".", "/") for name in names]
+    missing = [
+        str(p) for p in paths if not (p.is_dir() or p.with_suffix(".py").exists())
+    ]
+    assert missing == []
+
+
 def test_readme_lists_every_command():
     table = re.findall(r"^\| `loco-drake ([a-z ]+)` \|", readme(), flags=re.MULTILINE)
     assert table == list(_COMMANDS)

@@ -118,7 +118,7 @@ class Evaluation:
 
 
 def say_of(robot: str) -> Callable[[str], None]:
-    """Returns what prints on stderr what goes on with a robot."""
+    """Returns a function that prints progress for a robot on stderr."""
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     return lambda text: console.print(f"{robot}: {text}", markup=False)
 
@@ -126,7 +126,7 @@ def say_of(robot: str) -> Callable[[str], None]:
 def trained_on(
     paths: Mapping[str, Path], recorded: "Recorded", robot: str
 ) -> dict[str, list[str] | None]:
-    """Returns which recordings of validation weights were trained on; warns of them.
+    """Returns validation recordings that weights were trained on, with a warning.
 
     Args:
         paths: weights by kind, "tokenizer" or "generator".

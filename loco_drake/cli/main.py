@@ -104,9 +104,9 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def command_class(name: str) -> Any:
-    """Returns the class of a command; only now is its module, and all else, imported.
+    """Returns the class of a command, importing its module on demand.
 
-    So ``--help`` need not wait for torch and Drake.
+    ``--help`` thus does not import torch and Drake.
     """
     module = import_module(
         f"loco_drake.cli.{_MODULES.get(name, name.replace(' ', '_'))}"

@@ -1,4 +1,4 @@
-"""What commands print for people and write for programs."""
+"""Output of commands: tables for people, JSON for programs."""
 
 import json
 import sys
@@ -29,13 +29,13 @@ def write_json(path: Path | None, figures: dict[str, Any]) -> None:
 
 
 def write_figure(figure: "Figure", path: Path, dpi: int = 120) -> None:
-    """Writes a picture, wholly or not at all."""
+    """Writes a plot, atomically."""
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=dpi)
 
 
 def write_results(path: Path | None, figures: dict[str, Any]) -> None:
-    """Writes what ``report`` reads, with a hash that tells damage."""
+    """Writes results for ``report``, with a hash that detects damage."""
     write_json(path, {**figures, "sha256": figures_sha256(figures)})
 
 
@@ -71,7 +71,7 @@ def tracked(items: Iterable[Item], what: str, total: int) -> Iterable[Item]:
 
 
 def print_failed(failed: Iterable[tuple[str, str]]) -> None:
-    """Says on stderr which clips failed, and why."""
+    """Prints failed clips and the reasons on stderr."""
     _print_of_clips("Failed", failed)
 
 
@@ -80,7 +80,7 @@ MARK = " (!)"
 
 
 def print_warnings(warnings: Mapping[str, Sequence[str]]) -> None:
-    """Says under a table and on stderr which clips are outside their bounds, and why.
+    """Prints clips outside their bounds, and the figures, on stdout and stderr.
 
     Args:
         warnings: sentences by clip; nothing is printed if there is none.

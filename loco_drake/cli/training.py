@@ -1,4 +1,4 @@
-"""What the ``train`` commands share."""
+"""Steps that the ``train`` commands share."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,7 +15,7 @@ _FOLDERS = ("motions", "references", "tokenizer")
 
 
 def parse_resumed(command: Any, prog: str, args: Sequence[str]) -> Any:
-    """Returns a command that goes on: options that are not given are those of the run.
+    """Returns a command that resumes; options that are not given are those of the run.
 
     Args:
         command: as parsed with the defaults of its class.
@@ -51,7 +51,7 @@ def parse_resumed(command: Any, prog: str, args: Sequence[str]) -> Any:
 
 
 def print_stopped(done: int, steps: int) -> int:
-    """Says on stderr how to go on; returns the exit status of unfinished work."""
+    """Prints how to resume on stderr; returns the exit status of unfinished work."""
     how = "the same command with --resume goes on" if done else "nothing is saved yet"
     Console(stderr=True, highlight=False).print(
         f"Stopped after {done} of {steps} steps; {how}."

@@ -1,8 +1,8 @@
-"""Classifiers that tell which gait a trajectory is of: a transformer, a linear one.
+"""Gait classifiers for trajectories: a transformer and a linear one.
 
-The transformer is after PoseGPT's (Lucas et al. 2022), on which the paper's Table 1 is
-built: attention over short stretches of the trajectory, averaged over time, then a
-layer of few channels that the Frechet distance is measured on.
+The transformer follows PoseGPT's (Lucas et al. 2022), on which the paper's Table 1 is
+based: attention over short stretches of the trajectory, averaged over time, then a
+narrow layer in which the Frechet distance is measured.
 """
 
 from dataclasses import asdict, dataclass
@@ -33,7 +33,7 @@ LEARNING_RATE = 1e-3
 
 @dataclass(frozen=True)
 class ClassifierConfig:
-    """What is needed to build a :class:`GaitClassifier`."""
+    """Sizes of a :class:`GaitClassifier`."""
 
     labels: tuple[str, ...]  # names of the gait labels that it tells apart
     frames_per_patch: int = 5  # frames that are put side by side as one step of time
@@ -45,7 +45,7 @@ class ClassifierConfig:
 
 
 class GaitClassifier(nn.Module):
-    """Channels of :mod:`loco_drake.evaluation.samples` to logits of labels.
+    """Maps channels of :mod:`loco_drake.evaluation.samples` to logits of labels.
 
     Args:
         config: its sizes.
@@ -133,8 +133,7 @@ def train_classifier(
 ) -> tuple[GaitClassifier, LoopResult]:
     """Trains a classifier and writes ``classifier.safetensors`` if it was not stopped.
 
-    All labels are seen equally often, and every trajectory as it is as often as
-    mirrored.
+    All labels are seen equally often, and so are trajectories and their mirror images.
 
     Args:
         samples: of the labels in ``config``; others are not looked at.
@@ -172,7 +171,7 @@ def train_classifier(
 def class_indices(
     labels: NDArray[np.int64], names: tuple[str, ...]
 ) -> NDArray[np.int64]:
-    """Returns the place in ``names`` of each index into LABELS, -1 where it is not."""
+    """Returns the position in ``names`` of each index into LABELS, -1 if absent."""
     known = map(str, LABELS)
     return np.array([names.index(k) if k in names else -1 for k in known])[labels]
 

@@ -1,4 +1,4 @@
-"""How far a measured figure is to be trusted."""
+"""Confidence intervals of measured figures."""
 
 from dataclasses import dataclass
 
@@ -25,10 +25,10 @@ class Estimate:
 
 
 def wilson(share: float, count: float) -> tuple[float, float]:
-    """Returns Wilson's 95 % interval of a share that was seen in ``count`` trials.
+    """Returns Wilson's 95 % interval of a share observed in ``count`` trials.
 
-    Wilson 1927. Unlike a bootstrap it does not shrink to a point where all trials
-    succeeded.
+    Wilson 1927. Unlike a bootstrap it does not collapse to a point if all trials
+    succeed.
     """
     z2 = _Z**2
     middle = (share + z2 / (2 * count)) / (1 + z2 / count)

@@ -1,7 +1,6 @@
-"""The library of motion in one picture: how much there is, and how it differs.
+"""Plots of a library of motion: its size and variety.
 
-The paper's Figure 2 shows the distribution of its library; this shows that of any
-folder of Motion files.
+Like the paper's Figure 2, but for any folder of Motion files.
 """
 
 from collections.abc import Iterable
@@ -34,7 +33,7 @@ _STRIDES = 2  # Solo8's clips hold few
 
 @dataclass(frozen=True)
 class MotionPoint:
-    """What the picture shows of one motion."""
+    """Figures of one motion in the plot."""
 
     label: GaitLabel  # what it does
     side: str  # of the split
@@ -48,7 +47,7 @@ class MotionPoint:
 
 
 def describe(motion: Motion) -> MotionPoint:
-    """Returns what the picture shows of a motion of at least two frames."""
+    """Returns the figures of a motion of at least two frames."""
     robot = get_robot(motion.robot)
     timing = gait_timing(motion_track(motion, robot), _STRIDES)
     features = [motion_features(robot, cut) for cut in trajectories(motion)]
@@ -76,9 +75,9 @@ def principal_components(rows: Array, count: int = 2) -> tuple[Array, Array]:
 
 
 def library_figure(points: Iterable[MotionPoint], title: str) -> Figure:
-    """Returns a figure of four parts: seconds, rhythm, duty factor, an embedding.
+    """Returns a figure of four plots: seconds, gait timing, duty factor, an embedding.
 
-    Colours stand for sources, markers for gaits; what is for validation is hollow.
+    Colours stand for sources and markers for gaits; validation is hollow.
 
     Args:
         points: of motions with one of the fifteen labels.

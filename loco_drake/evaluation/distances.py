@@ -1,16 +1,17 @@
-"""How far generated motion is from recorded motion, as a whole and one by one.
+"""Distances between generated and recorded motion, of sets and of trajectories.
 
 Frechet distance (Heusel et al. 2017, "FID")
-    Of two sets of feature vectors, each taken for a normal distribution. Here the
-    features are the embeddings of the gait classifier: 32 channels, so that a few
-    hundred trajectories tell a covariance. The distance is biased upward where
-    trajectories are few; it says something only beside that of two sets of real ones.
+    Between two sets of feature vectors, each approximated by a normal distribution.
+    The features are embeddings of the gait classifier, whose 32 channels allow a
+    covariance to be estimated from a few hundred trajectories. The distance is biased
+    upward for few trajectories, and is meaningful only beside that of two sets of
+    recordings.
 Distance to the nearest recording
-    Is a motion new, or learned by heart? The distance of a trajectory to a recorded
-    stretch is the least joint RMS, in rad, over all shifts in time at which the two
-    overlap by OVERLAP seconds at least; the mean square is over the frames of the
-    overlap and the twelve joints. What was learned by heart is nearer to what was
-    learned from than a recording of another subject is.
+    Distinguishes novel from memorized motion. The distance of a trajectory to a
+    recorded stretch is the smallest RMS joint difference, in rad, over all time shifts
+    with an overlap of at least OVERLAP seconds. The mean is over the frames of the
+    overlap and the twelve joints. Memorized motion is nearer to the training data than
+    recordings of other subjects are.
 """
 
 from collections.abc import Sequence

@@ -1,27 +1,24 @@
-"""Does motion of a minute end as it began?
+"""Drift: the difference between the end and the beginning of long motion.
 
 The last 10 s of each motion are compared with its first 10 s in five figures:
 
 speed            of the base along its heading, m/s
-height           mean of the base's, m
+height           mean height of the base, m
 turn rate        change of the heading over the 10 s, rad/s
 stride period    see :mod:`loco_drake.motion.gait_timing`, s
 slip             median speed of the toes in stance, m/s
 
-A figure's change is the median over motions of ``|last - first|``. How much two samples
-of the gait differ is told by the first 10 s of motions of different seeds: 95 % of the
-pairs differ by no more than the tolerance, which is at least the RESOLUTION of the
-figure. Drift is change over tolerance, and the drift of a generator is that of its
-worst figure of its worst gait: 1 or less means that the last 10 s differ from the first
-no more than two samples from each other. (By chance alone a figure of a generator that
-does not drift gets about .35.) A rhythm that is lost on the way counts as a change of
-the period by itself.
+The change of a figure is the median over motions of ``|last - first|``. Its tolerance
+is the difference that 95 % of pairs of first windows of different seeds do not exceed,
+and at least the RESOLUTION of the figure. Drift is change over tolerance, and the drift
+of a generator is that of the worst figure of the worst gait. Up to 1, the last 10 s
+differ from the first no more than two samples of the gait do; chance alone gives about
+.35 per figure. A lost rhythm counts as a change by the whole period.
 
-Whether a motion turns or sinks more than those that it was learned from is told by
-:func:`beyond_recorded`: how much the heading changes within 2 s in the last 10 s, root
-mean square, over that of recordings, or .04 rad; and how much the height changes from
-first to last 10 s, over what 95 % of pairs of recordings of 2 s differ by at most, or
-1 mm.
+:func:`beyond_recorded` compares turning and height with recordings: the RMS change of
+heading within 2 s in the last 10 s over that of recordings, or over .04 rad; and the
+change of height from first to last 10 s over the difference that 95 % of pairs of
+recordings of 2 s do not exceed, or over 1 mm.
 """
 
 from collections.abc import Sequence
@@ -131,7 +128,7 @@ def _ends(motion: Motion) -> tuple[Motion, Motion]:
 
 
 def _tolerance(values: Array, resolution: float) -> float:
-    """Returns what 95 % of pairs of values differ by at most, or the resolution."""
+    """Returns the 95th percentile of differences of pairs, at least the resolution."""
     apart = pdist(values[:, None], "cityblock")
     return max(resolution, float(np.quantile(apart, 0.95)) if len(apart) else 0.0)
 

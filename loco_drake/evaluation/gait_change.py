@@ -1,17 +1,18 @@
-"""Is there a jump where the gait changes, and how long until the new one is reached?
+"""Smoothness of gait changes, and the time until the new gait is reached.
 
-A jump shows as a step of the joints or of the base, or as an acceleration, that the
-gaits themselves never have. The peaks of a motion are the greatest, over consecutive
-frames, of
+A discontinuity shows as a step or acceleration of joints or base that the gaits
+themselves do not contain. The peaks of a motion are the maxima over consecutive frames
+of
 
 joint_step_rad                 change of any joint
-joint_acceleration_rad_s2      change of any joint's velocity, over the time between
+joint_acceleration_rad_s2      change of any joint's velocity over time
 base_step_m                    change of the base's position
-base_acceleration_mps2         change of its velocity, over the time between
-base_turn_acceleration_rad_s2  the same of its angular velocity
+base_acceleration_mps2         change of its velocity over time
+base_turn_acceleration_rad_s2  change of its angular velocity over time
 
-The peaks of the AROUND seconds about a change are held against the greatest peaks of
-motions that keep one of the two gaits: up to 1, the change is no rougher than they are.
+The peaks in the AROUND seconds about a change are divided by the largest peaks of
+motions that keep one of the two gaits: up to 1, the change is no rougher than the
+gaits.
 """
 
 from collections.abc import Iterable, Sequence
@@ -32,7 +33,7 @@ SMOOTHED = 0.5  # s over which the picture's speed is averaged
 
 
 def peaks(motion: Motion) -> dict[str, float]:
-    """Returns the greatest changes between frames; see above."""
+    """Returns the largest changes between frames; see above."""
 
     def greatest(values: Array, rate: float = 1.0, *, of_each: bool = False) -> float:
         change = np.diff(values, axis=0) * rate
@@ -54,7 +55,7 @@ def peaks(motion: Motion) -> dict[str, float]:
 def roughness(
     motion: Motion, time: float, steady: Iterable[Motion]
 ) -> dict[str, float]:
-    """Returns the peaks about a change of gait over those of steady gaits.
+    """Returns the peaks about a gait change relative to steady gaits.
 
     Args:
         motion: changes its gait.
@@ -74,7 +75,7 @@ def forward_speed(robot: Robot, motion: Motion) -> Array:
 
 
 def change_figure(robot: Robot, motion: Motion, schedule: GaitSchedule) -> Figure:
-    """Returns a picture: which feet stand, and the speed, with the gaits' names."""
+    """Returns a plot of contacts and speed over time, with the labels."""
     time = np.arange(len(motion)) / motion.fps
     figure = Figure(figsize=(11, 4.2), layout="constrained")
     feet, speed = figure.subplots(2, 1, sharex=True)

@@ -1,4 +1,4 @@
-"""How good generated motion is: all figures of ``loco-drake evaluate generation``."""
+"""All figures of ``loco-drake evaluate generation``."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -60,7 +60,8 @@ def score_generation(
 ) -> tuple[dict[str, Any], dict[str, Recognition]]:
     """Compares generated with recorded motion of one robot.
 
-    Only labels that recordings of both sides and generated motion have are compared.
+    Only labels with training and validation recordings and generated motion are
+    compared.
 
     Args:
         robot: that of all motions.

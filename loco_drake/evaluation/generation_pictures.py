@@ -1,4 +1,4 @@
-"""Pictures of what tokenizer and generator do."""
+"""Plots of tokenizer and generator."""
 
 from collections.abc import Mapping, Sequence
 
@@ -50,7 +50,7 @@ def generation_figures(
 
 
 def confusion_figure(recognition: Recognition, title: str) -> Figure:
-    """Returns three confusion matrices: what each gait (row) was taken for."""
+    """Returns three confusion matrices; a row is the true gait."""
     figure = Figure(figsize=(15, 6.6), layout="constrained")
     figure.suptitle(title)
     labels = [str(LABELS[label]) for label in recognition.labels]

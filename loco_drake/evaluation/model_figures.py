@@ -1,6 +1,6 @@
-"""What is scored of a robot's motion model, or of Motion files, and of a model alone.
+"""Scores of a robot's motion model, or of Motion files.
 
-What cannot be measured is null, and ``reason`` says why.
+Figures that cannot be measured are null, with a ``reason``.
 """
 
 import time
@@ -115,7 +115,7 @@ def add_model_figures(
 
 
 def real_time_factor(model: MotionModel, label: GaitLabel) -> float:
-    """Returns seconds of motion over seconds of writing it, one motion alone, warm."""
+    """Returns the real-time factor of generating one motion, after a warm-up."""
     generate_motion(model, label, 1.0, 0)
     start = time.perf_counter()
     generate_motion(model, label, TIMED_SECONDS, 0)

@@ -57,7 +57,7 @@ Fit = Callable[[Samples, int], Recognizer]
 
 
 def linear_recognizer(samples: Samples, seed: int = 0) -> Recognizer:
-    """Fits a multinomial logistic regression to the summaries; nothing is random."""
+    """Fits a multinomial logistic regression to the summaries, deterministically."""
 
     def features(of: Samples) -> Array:
         return of.summaries.reshape(2 * len(of), -1)
@@ -98,7 +98,7 @@ class TransformerRecognizer:
 
 @dataclass(frozen=True, eq=False)
 class Recognition:
-    """How well one kind of classifier did."""
+    """The results of one kind of classifier."""
 
     # By row of the table above, then by "all" or source.
     accuracies: dict[str, dict[str, Estimate]]
@@ -188,7 +188,7 @@ def _accuracies(answers: Labels, tested: Samples) -> dict[str, Estimate]:
 
 
 def confusion_matrix(answers: Labels, truth: Labels, labels: Labels) -> Array:
-    """Returns the share of each true label (row) that was taken for each (column).
+    """Returns a confusion matrix; rows are true labels and sum to 1.
 
     Args:
         answers: indices into LABELS, shape (runs, N, 2).

@@ -1,4 +1,4 @@
-"""Recorded motion of a robot, on the two sides of the split, to compare with."""
+"""Recorded motion of a robot as reference, split into training and validation sets."""
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -73,9 +73,9 @@ def retarget_recordings(
 def by_split(
     motions: Sequence[Motion], failed: dict[str, str] | None = None
 ) -> Recorded:
-    """Returns motions on the side of the split that their provenance names.
+    """Returns motions in the sets that their provenance names.
 
-    Motions that name none are for training.
+    Motions without one are in the training set.
     """
     held = [m.provenance.get("split") == VALIDATION for m in motions]
     return Recorded(

@@ -66,7 +66,7 @@ _ROBOT_STRIDES = 2
 
 @dataclass(frozen=True)
 class GaitFidelity:
-    """Errors of a robot's rhythm; 0 is perfect."""
+    """Errors of the gait timing of a robot; 0 is perfect."""
 
     stride_period_error: float  # |T_robot / T_source - 1|
     # The largest error of the lag of one toe behind another, over the six pairs of
@@ -83,7 +83,7 @@ NO_RHYTHM = GaitFidelity(
 
 
 def gait_fidelity(source: Track, robot: Track) -> GaitFidelity | None:
-    """Returns how far the robot's rhythm is off.
+    """Returns the errors of the robot's gait timing.
 
     Args:
         source: of the animal.
@@ -101,7 +101,7 @@ def gait_fidelity(source: Track, robot: Track) -> GaitFidelity | None:
 
 
 def timing_errors(source: GaitTiming, robot: GaitTiming) -> GaitFidelity:
-    """Returns how far the timing of a robot is off that of an animal."""
+    """Returns the differences between the gait timing of a robot and an animal."""
     late = robot.phase_lags - source.phase_lags
     between = (late[:, None] - late + 0.5) % 1.0 - 0.5
     duty = np.abs(robot.duty_factors - source.duty_factors)

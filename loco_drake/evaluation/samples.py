@@ -1,22 +1,16 @@
-"""Trajectories of 2 s as numbers that tell how a robot moves, not where.
+"""Trajectories of 2 s as feature vectors that are independent of position and heading.
 
-All that compares real with generated motion starts from these. They are computed from
-base and joints alone: contact labels, which a generator writes too, are left out.
+All comparisons of recorded with generated motion use them. They are computed from base
+and joints; contact labels, which a generator also produces, are excluded.
 
-Channels
-    Those of :mod:`loco_drake.generation.features` up to the joints: velocity of the
-    base in its heading frame, yaw rate, height, roll, pitch, twelve joint angles.
-    Where a trajectory begins and which way it heads makes no difference.
-Summary
-    For each channel its mean over time, its standard deviation, and the root mean
-    squares of its change from frame to frame and of the change of that; then the
-    correlations of the six pairs of thigh angles, which tell a pace from a trot. All
-    are rounded to RESOLUTION: a roll that is exactly zero in one set and a hundred
-    thousandth of a radian in the other is no difference.
-Mirror image
-    Left and right are a matter of chance in recordings, and generators learn from
-    mirror images too. Each trajectory therefore counts with its mirror image, one half
-    each: to prefer a side is no gait of its own.
+Channels     Those of :mod:`loco_drake.generation.features` up to the joints: velocity
+of the     base in its heading frame, yaw rate, height, roll, pitch, twelve joint
+angles. Summary     For each channel its mean and standard deviation over time, and the
+root mean squares     of its first and second differences; then the correlations of the
+six pairs of thigh     angles, which distinguish a pace from a trot. All are rounded to
+RESOLUTION, since a     roll of exactly zero does not differ from one of 1e-5 rad.
+Mirror image     Left and right are chance in recordings, and generators are trained
+with mirror     images. Each trajectory and its mirror image therefore count one half.
 """
 
 from collections.abc import Iterable, Sequence

@@ -1,14 +1,13 @@
-"""How well recordings survive the way to tokens and back: ``evaluate tokenizer``.
+"""Reconstruction by the tokenizer: the figures of ``evaluate tokenizer``.
 
-The figures of a label are those of :mod:`loco_drake.generation.tokenizer_score`, over
-all frames of its recordings. Those of all labels are roots of the mean of the labels'
-squares: every label weighs the same. The codebook's use is the share of all codes that
-occur in the recordings of both sides of the split and their mirror images.
+The figures of a label are those of :mod:`loco_drake.generation.tokenizer_score` over
+all frames of its recordings. Over all labels they are the root of the mean square over
+labels. Codebook usage is the share of all codes that occur in the recordings of both
+sets and their mirror images.
 
-Tokens as a language of all robots, ``transfer_joint_rmse_rad``: the Go2's motion of a
-recording is encoded as the Go2's and decoded for the A1; what comes out is compared
-with the A1's own retarget of the same recording, joint by joint and frame by frame, RMS
-over all frames and joints.
+``transfer_joint_rmse_rad`` measures whether tokens mean the same for both robots: the
+Go2's motion of a recording is encoded as the Go2's, decoded for the A1, and compared
+with the A1's own retargeted motion, RMS over all frames and joints.
 """
 
 from collections.abc import Sequence
@@ -93,7 +92,7 @@ def _scores(
 def transfer_rmse(
     tokenizer: Tokenizer, pairs: Sequence[tuple[Motion, Motion]]
 ) -> float:
-    """Returns the RMS of the joints' error, in rad, over all pairs.
+    """Returns the RMS joint error of transferred motion over all pairs, rad.
 
     Args:
         tokenizer: knows both robots.
@@ -121,7 +120,7 @@ def transfer_rmse(
 def pair_up(
     given: Sequence[Motion], wanted: Sequence[Motion]
 ) -> list[tuple[Motion, Motion]]:
-    """Returns the motions of two robots that were made of the same stretches."""
+    """Returns pairs of motions of two robots from the same stretches."""
 
     def stretch(motion: Motion) -> tuple[str, str | None, str | None]:
         file, frames = (motion.provenance.get(key) for key in ("file", "frames"))

@@ -1,8 +1,7 @@
-"""Simulations that are recorded, and how well the robot followed its plan.
+"""Recorded simulations, and metrics of tracking.
 
-All figures are computed from what was simulated: states and plan states sampled every
-PLAN_DT, the first at time 0, and the reward's terms. Where a robot falls the samples
-end.
+All figures are computed from simulated states and plan states, sampled every PLAN_DT
+from time 0, and from the terms of the reward. Samples end when the robot falls.
 """
 
 import time
@@ -56,7 +55,7 @@ _LOGGED = ("state", "plan_state", "path_time", "desired_state", "reward_terms")
 
 @dataclass(frozen=True)
 class Rollout:
-    """What a simulation left."""
+    """The record of a simulation."""
 
     state: Array  # the plant's [q, v] at each sample, shape (N + 1, 37)
     plan_state: Array  # the same of the plan
@@ -68,7 +67,7 @@ class Rollout:
 
 
 class Recorder:
-    """The locomotion diagram with logs of its ports, for any number of episodes.
+    """A locomotion diagram that logs its ports, for any number of episodes.
 
     Args:
         scenario: what to simulate.
@@ -98,7 +97,7 @@ class Recorder:
         return self.simulator.get_mutable_context()
 
     def start(self, **episode: Any) -> None:
-        """Starts an episode, see :func:`StartEpisode`; forgets what was recorded."""
+        """Starts an episode and clears the logs, see :func:`StartEpisode`."""
         for log in self._logs:
             log.FindMutableLog(self.context).Clear()
         StartEpisode(self.simulator, **episode)
@@ -152,7 +151,7 @@ class Recorder:
 
 
 def tracking_metrics(rollout: Rollout) -> dict[str, float]:
-    """Returns how well the plan was followed, all figures by name."""
+    """Returns all tracking metrics by name."""
     position, orientation = base_errors(rollout)
     return {
         "normalized_return": normalized_return(rollout),
@@ -165,9 +164,9 @@ def tracking_metrics(rollout: Rollout) -> dict[str, float]:
 
 
 def normalized_return(rollout: Rollout) -> float:
-    """Reward summed over all steps that were to be made, over its maximum, times 100.
+    """Sum of rewards over its maximum for the whole episode, times 100.
 
-    The maximum is 1 a step. Steps lost to a fall count, with a reward of 0.
+    The maximum is 1 per step. Steps lost to a fall count with a reward of 0.
     """
     return 100 * float(rollout.reward[1:].sum()) / rollout.steps
 
@@ -209,7 +208,7 @@ def base_errors(rollout: Rollout) -> tuple[float, float]:
 
 
 def stretch(rollout: Rollout) -> float:
-    """Duration of the plan as it was played over its duration as it was written."""
+    """Duration of the smoothed plan over its duration before smoothing."""
     played = (len(rollout.path_time) - 1) * PLAN_DT
     written = float(rollout.path_time[-1] - rollout.path_time[0])
     return played / written if written > 0 else 1.0
@@ -234,15 +233,14 @@ def slip_speeds(rollout: Rollout, robot: Robot) -> Array:
 
 
 def effort_metrics(rollout: Rollout, robot: Robot) -> dict[str, float]:
-    """Returns what the actuators have to do, all figures by name.
+    """Returns metrics of the actuators by name.
 
-    With the torque that the PD asks for, tau = kp (q_d - q) - kd v, cut at the effort
-    limit:
+    With the torque of the PD, tau = kp (q_d - q) - kd v, clipped at the effort limit:
 
     - torque_saturation: share of samples and joints at the effort limit
-    - speed_saturation: share of samples and joints at the speed limit or beyond
+    - speed_saturation: share of samples and joints at or beyond the speed limit
     - cost_of_transport: mean of sum |tau v| over mass, gravity and mean horizontal
-      speed; what braking returns is not counted as a gain
+      speed; braking recovers no energy
     """
     q, base_and_joints = split(rollout.state)
     v = base_and_joints[JOINT_VELOCITIES]
@@ -258,7 +256,7 @@ def effort_metrics(rollout: Rollout, robot: Robot) -> dict[str, float]:
 
 
 def dress(meshcat: Meshcat) -> None:
-    """Gives the scene its sky, and a camera at the start."""
+    """Sets the sky and the initial camera of the scene."""
     meshcat.SetProperty("/Background", "top_color", [0.75, 0.83, 0.92])
     # These would be drawn through the floor.
     meshcat.SetProperty("/Grid", "visible", False)
@@ -267,7 +265,7 @@ def dress(meshcat: Meshcat) -> None:
 
 
 def frame(meshcat: Meshcat, p_WB: NDArray[np.float64]) -> None:
-    """Puts the camera where all of the base's path, shape (N, 3), can be seen."""
+    """Moves the camera to show all of the base's path, shape (N, 3)."""
     middle = (p_WB.min(axis=0) + p_WB.max(axis=0)) / 2
     along = p_WB[-1, :2] - p_WB[0, :2]
     length = float(np.hypot(*along))

@@ -65,7 +65,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Episode:
-    """What came of a trial."""
+    """The result of a trial."""
 
     trial: Trial
     figures: dict[str, float]  # of the episode, by name
@@ -147,7 +147,7 @@ def run_trials(
     workers: int = 1,
     randomization: RandomizationConfig | None = None,
 ) -> Iterator[Episode]:
-    """Simulates trials, and yields what came of each, in their order.
+    """Simulates trials and yields their results in order.
 
     Args:
         scenario: with a generated reference, or a PlanReference where the trials have
@@ -180,7 +180,7 @@ def summarize(episodes: Sequence[Episode]) -> dict[str, Any]:
 
 
 def figures(episodes: Sequence[Episode]) -> dict[str, Any]:
-    """Returns the figures of episodes, at least one, taken together."""
+    """Returns the aggregated figures of at least one episode."""
 
     def values(name: str) -> NDArray[np.float64]:
         return np.array([episode.figures[name] for episode in episodes])

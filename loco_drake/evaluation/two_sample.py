@@ -1,9 +1,8 @@
-"""Can a classifier tell generated motion from real motion?
+"""Two-sample test: whether a classifier distinguishes generated from recorded motion.
 
-The two-sample test of Lopez-Paz and Oquab 2017: .5 means that it cannot. Both classes
-have equally many trajectories of each label, so that labels tell nothing. Accuracies
-are of folds that the classifier has not seen: all trajectories of a subject, and mirror
-images, are in one fold.
+The test of Lopez-Paz and Oquab 2017; .5 is chance. Both classes have the same number of
+trajectories per label. Accuracies are those of held-out folds; all trajectories of a
+subject, with their mirror images, are in one fold.
 """
 
 from collections.abc import Callable
@@ -34,7 +33,7 @@ FOLDS = 5
 def fit_kernel(features: Array, classes: NDArray[np.int64]) -> Pipeline:
     """Fits a support vector machine with radial basis functions.
 
-    It sees what no plane separates.
+    It finds nonlinear differences.
     """
     return make_pipeline(StandardScaler(), SVC(C=3.0)).fit(features, classes)
 
@@ -48,7 +47,7 @@ FITS: dict[str, Callable[[Array, NDArray[np.int64]], Any]] = {
 def two_sample_accuracy(
     a: Samples, b: Samples, seeds: list[int], fit: str = "linear"
 ) -> Estimate | None:
-    """Returns how well trajectories of ``a`` and ``b`` are told apart.
+    """Returns the accuracy of distinguishing trajectories of ``a`` and ``b``.
 
     Args:
         a: one set, such as real trajectories.

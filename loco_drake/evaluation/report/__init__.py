@@ -1,1 +1,1 @@
-"""The report: one page of everything that was measured, beside what is published."""
+"""The report: one page of all results beside the published ones."""

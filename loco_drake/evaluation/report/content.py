@@ -1,4 +1,4 @@
-"""What the report shows, as ``report.yaml`` says: goals, published figures, columns."""
+"""The content of the report from ``report.yaml``: goals, published figures, columns."""
 
 from dataclasses import dataclass, field
 from math import inf
@@ -38,7 +38,7 @@ class Bound:
 
 @dataclass
 class Price(Figure):
-    """A figure beside that of a goal; outside of its bound the goal is missed."""
+    """A second figure for a goal, which is missed if it is out of bounds."""
 
     text: str = ""
     least: float = -inf

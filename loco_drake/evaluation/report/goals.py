@@ -1,4 +1,4 @@
-"""The goals beside what was measured."""
+"""Goals compared with measured figures."""
 
 from dataclasses import dataclass, replace
 from math import inf
@@ -93,7 +93,7 @@ def measure(goal: Goal, results: Results, robot: str) -> Measured | None:
 def _read(
     figure: Figure, results: Results, robot: str, *, highest: bool = False
 ) -> Measured | None:
-    """Returns the figure, where ``*`` stands for the label with the worst."""
+    """Returns the figure; ``*`` in a key stands for the worst label."""
     within = results.of(figure.file, robot)
     if within is None:
         return None

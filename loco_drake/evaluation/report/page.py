@@ -1,8 +1,8 @@
-"""From a folder of results to a page: one HTML file that needs nothing else.
+"""Builds the page: one self-contained HTML file from a folder of results.
 
-Replays are simulations of the shipped policies, as pages of Meshcat. Such a page is a
+Replays are simulations of the shipped policies as Meshcat pages. Such a page contains a
 viewer and meshes of several MB, and a recording of a few hundred kB. Replays of a robot
-differ in the recording alone, so that whatever they have in common is kept once.
+differ in the recording only, so common parts are stored once.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The pictures of the report: SVG elements that take their ink from the page's text."""
+"""Plots of the report as SVG elements in the colours of the page."""
 
 import io
 import re

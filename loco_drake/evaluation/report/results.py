@@ -1,7 +1,7 @@
-"""Results on disk: what the ``evaluate`` commands wrote, by robot.
+"""Results on disk, written by the ``evaluate`` commands, by robot.
 
-Whatever is read of them is checked. A file that holds anything else than it should is
-damaged, which one sentence says.
+Everything that is read is checked; unexpected content is reported as damage in one
+sentence.
 """
 
 from collections.abc import Callable, Iterator

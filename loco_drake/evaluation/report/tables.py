@@ -1,4 +1,4 @@
-"""Tables of the report, as text that a page only has to lay out."""
+"""Tables of the report as text, ready for layout."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
