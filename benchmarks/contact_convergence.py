@@ -3,7 +3,7 @@
 The Go2 trots open loop for 4 s under every solver, step and kind of foot; where it ends
 is compared with CENIC at accuracy 1e-5. Run it from the root of the repository:
 
-    python benchmarks/contact_convergence.py [--robot a1] [--speed 0.8]
+    python -m benchmarks.contact_convergence [--robot a1] [--speed 0.8]
 """
 
 import time
@@ -26,7 +26,7 @@ from loco_drake.common.rotations import yaw_of
 from loco_drake.models.legs import LEGS
 from loco_drake.models.plant import AddRobotPlant, ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import get_robot
-from loco_drake.models.trot import AddTrotSource
+from tests.models.trot import AddTrotSource
 
 DURATION = 4.0  # s
 STEPS = (1e-3, 2e-3, 5e-3, 1e-2)  # s

@@ -1,45 +1,44 @@
 """Opens a robot in Drake's model visualizer: ``python -m loco_drake.models go2``."""
 
-import argparse
 import sys
 from collections.abc import Sequence
 
+import tyro
 from pydrake.visualization import ModelVisualizer
 
 from loco_drake.common.errors import InputError
 
-from .robots import ROBOTS, ConfigureParser, get_robot
+from .robots import ConfigureParser, get_robot
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Shows the robot named in the arguments until the user quits.
+def show(
+    robot: tyro.conf.Positional[str],
+    visualize_frames: bool = False,
+    loop_once: bool = False,
+) -> int:
+    """Shows a robot in Meshcat: its links, frames, toes and joints.
 
-    Returns:
-        The exit status: 0, or 2 if there is no such robot.
+    Args:
+        robot: go2 or a1.
+        visualize_frames: draw each link's frame.
+        loop_once: draw it once and quit, for tests.
     """
-    parser = argparse.ArgumentParser(
-        prog="python -m loco_drake.models",
-        description="Look at a robot in Meshcat: its links, frames, toes and joints.",
-    )
-    parser.add_argument("robot", help=f"one of {', '.join(ROBOTS)}")
-    parser.add_argument(
-        "--visualize_frames", action="store_true", help="draw each link's frame"
-    )
-    parser.add_argument(
-        "--loop_once", action="store_true", help="draw it once and quit, for tests"
-    )
-    arguments = parser.parse_args(argv)
     try:
-        robot = get_robot(arguments.robot)
-        visualizer = ModelVisualizer(visualize_frames=arguments.visualize_frames)
+        model = get_robot(robot)
+        visualizer = ModelVisualizer(visualize_frames=visualize_frames)
         ConfigureParser(visualizer.parser())
     except InputError as error:
         print(error, file=sys.stderr)
         return 2
-    visualizer.AddModels(url=robot.url)
-    stance = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, robot.stand_height, *robot.stand_joints]
-    visualizer.Run(position=stance, loop_once=arguments.loop_once)
+    visualizer.AddModels(url=model.url)
+    stance = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, model.stand_height, *model.stand_joints]
+    visualizer.Run(position=stance, loop_once=loop_once)
     return 0
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs :func:`show`; returns 0, or 2 if there is no such robot."""
+    return tyro.cli(show, prog="python -m loco_drake.models", args=argv)
 
 
 if __name__ == "__main__":

@@ -35,18 +35,13 @@ class ChainRobot(Quadruped):
     """A quadruped of which the kinematics are known, and nothing else.
 
     It can be retargeted to; simulating it would take inertias, motors and contact.
-
-    Attributes:
-        model: URDF text of links and joints alone.
-        axes: unit vectors along the joints' axes in B, all joints at zero, (4, n, 3).
-        origins: a point on each axis in B, all joints at zero, m, shape (4, n, 3).
-        toes: centres of the toe spheres in B, all joints at zero, m, shape (4, 3).
     """
 
-    model: str
+    model: str  # URDF text of links and joints alone
+    # Unit vectors along the joints' axes in B, all joints at zero, (4, n, 3).
     axes: Array
-    origins: Array
-    toes: Array
+    origins: Array  # a point on each axis in B, all joints at zero, m, shape (4, n, 3)
+    toes: Array  # centres of the toe spheres in B, all joints at zero, m, shape (4, 3)
 
     @property
     def p_BV(self) -> Array:
@@ -133,14 +128,9 @@ class ChainRobot(Quadruped):
         return joints.reshape(*joints.shape[:-2], len(self.joint_names))
 
     def _forward(self, joints: Array) -> tuple[Array, Array, Array]:
-        """Returns toes, axes and origins where the joints are at ``joints``.
+        """Returns toes (..., 4, 3), unit axes and origins (..., 4, n, 3), in B and m.
 
-        Args:
-            joints: rad, shape (..., 4, n).
-
-        Returns:
-            In B: toes (..., 4, 3) in m, unit axes (..., 4, n, 3), origins of the same
-            shape in m.
+        Joints are in rad, shape (..., 4, n).
         """
         half = joints[..., None] / 2
         turns = np.concatenate((np.cos(half), np.sin(half) * self.axes), axis=-1)

@@ -11,7 +11,6 @@ from pathlib import Path
 from threading import Lock
 
 import numpy as np
-from pydrake.multibody.parsing import PackageMap
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import atomic_path, cache_dir
@@ -38,17 +37,8 @@ _PACKAGE_XML = """<?xml version="1.0"?>
 """
 
 
-def AddMeshPackage(package_map: PackageMap) -> None:
-    """Registers ``loco_drake_meshes``; converts the meshes the first time.
-
-    Raises:
-        InputError: if the package ``example-robot-data`` is not installed.
-    """
-    package_map.AddPackageXml(str(convert_meshes() / "package.xml"))
-
-
 def convert_meshes() -> Path:
-    """Returns the folder of the converted meshes, which is created or updated.
+    """Returns the folder of the package ``loco_drake_meshes``, created or updated.
 
     Files are written atomically, and package.xml, which marks the folder as complete,
     is written last. Concurrent conversions are therefore safe.

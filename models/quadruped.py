@@ -18,34 +18,22 @@ class Quadruped(ABC):
     Arrays are read-only float64. Joints are in the order of ``joint_names``: legs FL,
     FR, RL, RR, in a leg from the trunk to the toe. B is the trunk frame: x forward, y
     left, z up. Methods take and return arrays with any leading shape.
-
-    Attributes:
-        name: name in Motion files.
-        definition: argument of :func:`loco_drake.models.robot_files.load_robot`.
-        joint_names: names of the J joints.
-        joint_lower: lower position limits in rad, shape (J,).
-        joint_upper: upper position limits in rad, shape (J,).
-        joint_speed_limits: rad/s, shape (J,).
-        p_BHip: origins of the legs' first joints in m, shape (4, 3).
-        foot_radius: radius of the toe spheres, m.
-        stand_joints: joints of the standing pose in rad, shape (J,).
-        stand_height: z of p_WB in m with the trunk level, the joints at
-            ``stand_joints`` and the lowest points of the toe spheres at z = 0.
-        trunk_frame: name of B in the model.
-        foot_frames: names of the frames at the centres of the toe spheres.
     """
 
-    name: str
-    definition: str
-    joint_names: tuple[str, ...]
-    joint_lower: Array
-    joint_upper: Array
-    joint_speed_limits: Array
-    p_BHip: Array
-    foot_radius: float
-    stand_joints: Array
+    name: str  # name in Motion files
+    definition: str  # argument of models.robot_files.load_robot
+    joint_names: tuple[str, ...]  # names of the J joints
+    joint_lower: Array  # lower position limits in rad, shape (J,)
+    joint_upper: Array  # upper position limits in rad, shape (J,)
+    joint_speed_limits: Array  # rad/s, shape (J,)
+    p_BHip: Array  # origins of the legs' first joints in m, shape (4, 3)
+    foot_radius: float  # radius of the toe spheres, m
+    stand_joints: Array  # joints of the standing pose in rad, shape (J,)
+    # Z of p_WB in m with the trunk level, the joints at stand_joints and the lowest
+    # points of the toe spheres at z = 0.
     stand_height: float
-    trunk_frame: str
+    trunk_frame: str  # name of B in the model
+    # Names of the frames at the centres of the toe spheres.
     foot_frames: tuple[str, ...]
 
     def __post_init__(self) -> None:

@@ -26,7 +26,7 @@ from .chains import ChainRobot
 from .legs import LEGS
 from .quadruped import Quadruped
 from .robots import ROBOTS, get_robot
-from .urdf import find_urdf, read_legs
+from .urdf import UrdfLegs, find_urdf, read_legs
 
 Array = NDArray[np.float64]
 
@@ -39,6 +39,7 @@ _MAX_FOOT = 0.4
 # An axis is where it should be if it is off by less than 45 degrees.
 _ALONG = np.sqrt(0.5)
 _MAX_TURN = 20.0  # rad; more must be degrees
+_LIMITS = ("lower", "upper", "speed")
 
 
 @dataclass(kw_only=True)
@@ -136,7 +137,7 @@ def _check(file: RobotFile) -> None:
                 f"All legs must have as many joints, but {LEGS[0]} has {count} and "
                 f"{name} {len(leg.joints)}."
             )
-        for key in ("stand", "lower", "upper", "speed"):
+        for key in ("stand", *_LIMITS):
             values = getattr(leg, key)
             if values and (len(values) != count or not np.isfinite(values).all()):
                 raise InputError(
@@ -168,14 +169,7 @@ def _make(file: RobotFile, path: Path) -> ChainRobot:
         [leg.foot for leg in legs],
         stand,
     )
-    lower, upper, speed = (
-        _limits(legs, key, own)
-        for key, own in (
-            ("lower", urdf.lower),
-            ("upper", urdf.upper),
-            ("speed", urdf.speed),
-        )
-    )
+    lower, upper, speed = (_limits(legs, key, urdf) for key in _LIMITS)
     joint_names = tuple(joint for leg in legs for joint in leg.joints)
     for joint, low, angle, high in zip(joint_names, lower, stand, upper, strict=True):
         if not low <= angle <= high:
@@ -226,10 +220,7 @@ def _make(file: RobotFile, path: Path) -> ChainRobot:
 def _check_trunk(trunk: str, toes: Array, hips: Array) -> None:
     """Raises InputError unless the legs are where their names say in the trunk frame.
 
-    Args:
-        trunk: name of the frame B.
-        toes: in the usual stance in B, m, shape (4, 3).
-        hips: origins of the first joints in B, m, shape (4, 3).
+    Toes (4, 3) in the usual stance and hips (4, 3), the first joints, are in B, in m.
     """
     ways = np.stack(
         (
@@ -257,16 +248,11 @@ def _check_trunk(trunk: str, toes: Array, hips: Array) -> None:
                 f"In the stance the feet are not below the trunk {trunk}, whose axes "
                 f"must be x forward, y left, z up: up from the feet is {_axis(R[2])}."
             )
-    middle = toes.mean(axis=0)
-    places = {
-        leg: f"{'front' if x > 0 else 'rear'} {'left' if y > 0 else 'right'}"
-        for leg, (x, y, _) in zip(LEGS, toes - middle, strict=True)
-    }
-    names = dict(
-        zip(LEGS, ("front left", "front right", "rear left", "rear right"), strict=True)
-    )
+    x, y, _ = (toes - toes.mean(axis=0)).T > 0
     wrong = [
-        f"{leg} is {place}" for leg, place in places.items() if place != names[leg]
+        f"{leg} is {'front' if x[k] else 'rear'} {'left' if y[k] else 'right'}"
+        for k, leg in enumerate(LEGS)
+        if (x[k], y[k]) != (leg[0] == "F", leg[1] == "L")
     ]
     if wrong:
         raise InputError(
@@ -287,10 +273,8 @@ def _axis(direction: Array) -> str:
     return f"{'-' if direction[k] < 0 else '+'}{'xyz'[k]}"
 
 
-def _limits(legs: list[LegFile], key: str, defaults: Array) -> Array:
+def _limits(legs: list[LegFile], key: str, urdf: UrdfLegs) -> Array:
     """Returns the limits of all joints: those of the file, else of the URDF."""
-    rows = [
-        getattr(leg, key) or own
-        for leg, own in zip(legs, defaults.reshape(4, -1), strict=True)
-    ]
+    defaults = getattr(urdf, key).reshape(4, -1)
+    rows = [getattr(leg, key) or own for leg, own in zip(legs, defaults, strict=True)]
     return np.concatenate(rows).astype(np.float64)

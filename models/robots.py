@@ -17,7 +17,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from loco_drake.common.errors import check_choice
 
 from .legs import LEGS
-from .meshes import AddMeshPackage
+from .meshes import convert_meshes
 from .quadruped import Quadruped
 
 Array = NDArray[np.float64]
@@ -39,34 +39,23 @@ class Robot(Quadruped):
         p_BF = p_BHip + Rx(a) [-l1 sin b - l2 sin(b + c), d, -l1 cos b - l2 cos(b + c)]
 
     from which the kinematics follow in closed form.
-
-    Attributes:
-        url: the model, ``package://...``; see :func:`ConfigureParser`.
-        effort_limits: at the joint, N m, shape (12,).
-        reflected_inertia: of the rotors at the joint, kg m^2, shape (12,).
-        joint_inertia: about each joint with the others locked in the standing pose,
-            including reflected inertia, kg m^2, shape (12,).
-        kp: stiffness of the PD in the plant, N m/rad, shape (12,).
-        kd: damping of the PD in the plant, N m s/rad, shape (12,).
-        mass: of the whole robot, kg.
-        abduction_offset: y in m from the hip joint's axis to the thigh joint, positive
-            on the left, shape (4,).
-        thigh_length: thigh joint to calf joint, m.
-        calf_length: calf joint to the centre of the toe sphere, m.
-        trunk_size: of the trunk's collision box, centred at B, in m, shape (3,).
     """
 
-    url: str
-    effort_limits: Array
-    reflected_inertia: Array
+    url: str  # the model, package://...; see ConfigureParser
+    effort_limits: Array  # at the joint, N m, shape (12,)
+    reflected_inertia: Array  # of the rotors at the joint, kg m^2, shape (12,)
+    # About each joint with the others locked in the standing pose, including reflected
+    # inertia, kg m^2, shape (12,).
     joint_inertia: Array
-    kp: Array
-    kd: Array
-    mass: float
+    kp: Array  # stiffness of the PD in the plant, N m/rad, shape (12,)
+    kd: Array  # damping of the PD in the plant, N m s/rad, shape (12,)
+    mass: float  # of the whole robot, kg
+    # Y in m from the hip joint's axis to the thigh joint, positive on the left, shape
+    # (4,).
     abduction_offset: Array
-    thigh_length: float
-    calf_length: float
-    trunk_size: Array
+    thigh_length: float  # thigh joint to calf joint, m
+    calf_length: float  # calf joint to the centre of the toe sphere, m
+    trunk_size: Array  # of the trunk's collision box, centred at B, in m, shape (3,)
 
     @property
     def p_BV(self) -> Array:
@@ -178,7 +167,7 @@ def ConfigureParser(parser: Parser, *, visual: bool = True) -> None:
     """
     parser.package_map().AddPackageXml(str(_MODELS / "package.xml"))
     if visual:
-        AddMeshPackage(parser.package_map())
+        parser.package_map().AddPackageXml(str(convert_meshes() / "package.xml"))
 
 
 def AddRobotModel(parser: Parser, name: str, *, visual: bool) -> ModelInstanceIndex:

@@ -1,6 +1,5 @@
 """The shipped weights."""
 
-from importlib import resources
 from pathlib import Path
 
 from loco_drake.common.errors import InputError
@@ -10,7 +9,7 @@ from .robots import ROBOTS, Robot
 
 def pretrained_dir() -> Path:
     """Returns the folder of the shipped weights."""
-    return Path(str(resources.files("loco_drake.models"))) / "pretrained"
+    return Path(__file__).parent / "pretrained"
 
 
 def pretrained_path(name: str) -> Path:
@@ -37,7 +36,14 @@ def policy_path(robot: Robot, policy: Path | None = None) -> Path:
         InputError: if there is no such policy; names the existing ones.
     """
     if policy is None:
-        return _main(robot)
+        main = pretrained_path(f"policy_{robot.name}")
+        if not main.is_file():
+            shipped = [n for n in ROBOTS if pretrained_path(f"policy_{n}").is_file()]
+            raise InputError(
+                f"There are no policy weights for {robot.name} yet; "
+                f"there are some for {', '.join(shipped) or 'no robot'}."
+            )
+        return main
     if policy.name != str(policy) or policy.suffix or policy.exists():
         return policy
     variants = policy_variants(robot)
@@ -49,14 +55,3 @@ def policy_path(robot: Robot, policy: Path | None = None) -> Path:
             + (f"there are {names}." if names else "there is but the main one.")
         )
     return variants[str(policy)]
-
-
-def _main(robot: Robot) -> Path:
-    paths = {name: pretrained_dir() / f"policy_{name}.safetensors" for name in ROBOTS}
-    shipped = [name for name, path in paths.items() if path.is_file()]
-    if robot.name not in shipped:
-        raise InputError(
-            f"There are no policy weights for {robot.name} yet; "
-            f"there are some for {', '.join(shipped) or 'no robot'}."
-        )
-    return paths[robot.name]

@@ -37,25 +37,16 @@ _WORLD, _NOT_WORLD = "world", "world_link"
 
 
 class UrdfLegs(NamedTuple):
-    """Four legs of n joints each, their frames where all joints are at zero.
+    """Four legs of n joints each, their frames where all joints are at zero."""
 
-    Attributes:
-        model: URDF text of links and joints alone, in which only the legs' joints move.
-        axes: unit vectors along the joints' axes in B, shape (4, n, 3).
-        origins: of the joints in B, m, shape (4, n, 3).
-        toes: origins of the foot frames in B, m, shape (4, 3).
-        lower: position limits, rad, shape (4 n,).
-        upper: position limits, rad, shape (4 n,).
-        speed: limits, rad/s, shape (4 n,).
-    """
-
+    # URDF text of links and joints alone, in which only the legs' joints move.
     model: str
-    axes: Array
-    origins: Array
-    toes: Array
-    lower: Array
-    upper: Array
-    speed: Array
+    axes: Array  # unit vectors along the joints' axes in B, shape (4, n, 3)
+    origins: Array  # of the joints in B, m, shape (4, n, 3)
+    toes: Array  # origins of the foot frames in B, m, shape (4, 3)
+    lower: Array  # position limits, rad, shape (4 n,)
+    upper: Array  # position limits, rad, shape (4 n,)
+    speed: Array  # limits, rad/s, shape (4 n,)
 
 
 def find_urdf(url: str, folder: Path) -> Path:
@@ -108,6 +99,7 @@ def read_legs(
     limits = [
         _read_limits(elements[check_choice("joint", name, elements)]) for name in names
     ]
+    lower, upper, speed = np.array(limits).T
     _check_independent(root, feet)
     model = _strip(root, names)
     plant = MultibodyPlant(time_step=0.0)
@@ -143,15 +135,15 @@ def read_legs(
     for joint, angle in zip(moving, stand, strict=True):
         joint.set_angle(context, angle)
     for foot, own in zip(feet, joints, strict=True):
-        _check_end(plant, context, root, foot, own[0])
+        _check_end(plant, context, foot, own[0])
     return UrdfLegs(
         model=model,
         axes=np.reshape(axes, (4, -1, 3)),
         origins=np.reshape(origins, (4, -1, 3)),
         toes=np.array(toes),
-        lower=np.array([low for low, _, _ in limits]),
-        upper=np.array([high for _, high, _ in limits]),
-        speed=np.array([speed for _, _, speed in limits]),
+        lower=lower,
+        upper=upper,
+        speed=speed,
     )
 
 
@@ -185,16 +177,12 @@ def _read_limits(joint: ET.Element) -> tuple[float, float, float]:
     name, kind = joint.get("name"), joint.get("type")
     if kind not in ("revolute", "continuous"):
         raise InputError(f"Joint {name} is {kind}; only revolute ones make a leg.")
-    element = joint.find("limit")
-    values = {} if element is None else element.attrib
+    limits = {"lower": "-inf", "upper": "inf", "velocity": "inf"}
+    if (element := joint.find("limit")) is not None:
+        limits |= element.attrib
     try:
         lower, upper, speed = (
-            float(values.get(key, default))
-            for key, default in (
-                ("lower", "-inf"),
-                ("upper", "inf"),
-                ("velocity", "inf"),
-            )
+            float(limits[key]) for key in ("lower", "upper", "velocity")
         )
     except ValueError:
         raise InputError(f"The limits of joint {name} are no numbers.") from None
@@ -272,9 +260,7 @@ def _check_path(
         )
 
 
-def _check_end(
-    plant: MultibodyPlant, context: Context, root: ET.Element, foot: str, hip: str
-) -> None:
+def _check_end(plant: MultibodyPlant, context: Context, foot: str, hip: str) -> None:
     """Raises InputError if a link of the leg reaches further than its foot."""
     frame, start = plant.GetFrameByName(foot), plant.GetJointByName(hip)
 
@@ -282,16 +268,12 @@ def _check_end(
         X_HP = point.CalcPose(context, start.frame_on_parent())
         return float(np.linalg.norm(X_HP.translation()))
 
-    below: dict[str | None, list[str | None]] = {}
-    for joint in root.iterfind("joint"):
-        below.setdefault(_end(joint, "parent"), []).append(_end(joint, "child"))
-    links = [frame.body().name()]
-    for link in links:  # grows
-        links += below.get(link, [])
-    furthest = max(links, key=lambda link: reach(plant.GetFrameByName(link)))
-    beyond = reach(plant.GetFrameByName(furthest)) - reach(frame)
+    # All other joints are fixed: what is beyond the foot is welded to it.
+    links = plant.GetBodiesWeldedTo(frame.body())
+    furthest = max(links, key=lambda link: reach(link.body_frame()))
+    beyond = reach(furthest.body_frame()) - reach(frame)
     if beyond > _FOOT_SHARE * reach(frame):
         raise InputError(
-            f"Foot {foot} is not the end of its leg: link {furthest} reaches "
+            f"Foot {foot} is not the end of its leg: link {furthest.name()} reaches "
             f"{beyond:.3g} m further."
         )

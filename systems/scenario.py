@@ -13,6 +13,7 @@ from loco_drake.common.errors import (
     check_choice,
     check_number,
 )
+from loco_drake.common.typed_yaml import refuse_repeated_keys
 from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS
@@ -214,6 +215,7 @@ def _overlaid(scenario: Scenario, text: str) -> Scenario:
             "brackets and aliases."
         )
     try:
+        refuse_repeated_keys(text)
         result = yaml_load_typed(schema=Scenario, data=text, defaults=scenario)
     except Exception as error:
         # The YAML library and the types raise many kinds.

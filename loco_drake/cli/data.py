@@ -97,12 +97,7 @@ class DataInspect:
         from loco_drake.retargeting.inspection import clip_figure, summarize
 
         clip = read_clip(
-            self.source,
-            self.file,
-            gait="unknown",
-            start=self.start,
-            end=self.end,
-            fps=self.fps,
+            self.source, self.file, "unknown", self.start, self.end, self.fps
         )
         summary, contacts = summarize(clip)
         stretch = f"{self.file.stem}-{clip.provenance['frames']}"

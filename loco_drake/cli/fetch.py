@@ -100,12 +100,11 @@ class DataFetch:
         )
         with progress:
             task = progress.add_task("Fetching", total=sum(f.size for f in to_fetch))
-            outcomes = download_files(
-                to_fetch,
-                folder,
-                mirror,
-                lambda done: progress.update(task, completed=done),
-            )
+
+            def report(done: int) -> None:
+                progress.update(task, completed=done)
+
+            outcomes = download_files(to_fetch, folder, mirror, report)
             failed = {file.name: error for file, error in outcomes if error}
         names = [file.name for listed in files.values() for file in listed]
         present = [name for name in names if name not in failed]
@@ -125,19 +124,15 @@ class DataFetch:
                 "attribution": DATASETS[source].attribution,
             }
         write_json(self.json, figures)
-        fetched = len(to_fetch) - len(failed)
-        print(
-            f"{len(present)} files in {folder}: {fetched} fetched, "
-            f"{len(present) - fetched} already there"
-        )
-        for name, error in list(failed.items())[:_LISTED_FAILURES]:
-            print(f"Failed: {name} {error}", file=sys.stderr)
-        if len(failed) > _LISTED_FAILURES:
-            more = len(failed) - _LISTED_FAILURES
-            print(f"Failed: {more} more files", file=sys.stderr)
+        here, fetched = len(names) - len(to_fetch), len(to_fetch) - len(failed)
+        told = f"{fetched} fetched, {here} already there"
+        print(f"{len(present)} files in {folder}: {told}")
+        lines = [f"Failed: {name} {error}" for name, error in failed.items()]
+        if (more := len(lines) - _LISTED_FAILURES) > 0:
+            lines[_LISTED_FAILURES:] = [f"Failed: {more} more files"]
         if failed:
-            again = "The same command again fetches only what is missing."
-            print(again, file=sys.stderr)
+            lines.append("The same command again fetches only what is missing.")
+            print("\n".join(lines), file=sys.stderr)
         return 1 if failed else 0
 
 

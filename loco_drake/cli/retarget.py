@@ -22,7 +22,7 @@ from loco_drake.motion.gaits import LABELS
 if TYPE_CHECKING:
     from loco_drake.datasets.segments import Segment
     from loco_drake.datasets.split import Split
-    from loco_drake.retargeting.batch import Outcome
+    from loco_drake.retargeting.retarget import Outcome, RetargetReport
 
 
 @dataclass(kw_only=True)
@@ -86,7 +86,7 @@ class Retarget:
         """
         from loco_drake.datasets.registry import DATASETS
         from loco_drake.models.robot_files import load_robot
-        from loco_drake.retargeting.batch import retarget_segments
+        from loco_drake.retargeting.retarget import retarget_segments
         from loco_drake.retargeting.scaling import Variant
 
         robot = load_robot(self.robot)
@@ -109,14 +109,11 @@ class Retarget:
         if self.file is not None and failed:
             raise InputError(str(failed[0].error))
         write_json(self.json, {o.segment.name: _figures(o) for o in outcomes})
-        rows = [_row(outcome) for outcome in outcomes if outcome.report is not None]
+        reports = {o.segment.name: o.report for o in outcomes if o.report is not None}
+        doubtful = {name: r.warnings for name, r in reports.items() if r.warnings}
+        rows = [[k + MARK * (k in doubtful), *_cells(r)] for k, r in reports.items()]
         title = f"Motion files in {out}: {len(rows)}{', mirrored' * self.mirror}"
-        print_table(title, list(_COLUMNS), rows)
-        doubtful = {
-            o.segment.name: o.report.warnings
-            for o in outcomes
-            if o.report is not None and o.report.warnings
-        }
+        print_table(title, ["clip", *_COLUMNS], rows)
         print_warnings(doubtful)
         if split is not None and self.trajectories:
             self._cut(outcomes, split, out.parent / f"{out.name}-trajectories")
@@ -125,7 +122,7 @@ class Retarget:
 
     def _cut(self, outcomes: "list[Outcome]", split: "Split", folder: Path) -> None:
         from loco_drake.datasets.split import TRAIN, VALIDATION
-        from loco_drake.retargeting.batch import stretches_of
+        from loco_drake.retargeting.retarget import stretches_of
         from loco_drake.retargeting.trajectories import (
             SECONDS,
             choose_windows,
@@ -170,14 +167,7 @@ class Retarget:
         if self.source is None or len(self.gait) != 1:
             raise InputError("A FILE needs its --source and one --gait.")
         (gait,) = self.gait
-        clip = read_clip(
-            self.source,
-            file,
-            gait=gait,
-            start=self.start,
-            end=self.end,
-            fps=self.fps,
-        )
+        clip = read_clip(self.source, file, gait, self.start, self.end, self.fps)
         start, end = map(int, clip.provenance["frames"].split("-"))
         return Segment(self.source, file, gait, start, end, clip.fps)
 
@@ -188,27 +178,20 @@ def _figures(outcome: "Outcome") -> dict[str, object]:
     return {**asdict(outcome.report), "path": str(outcome.path)}
 
 
+# Title to key, factor and digits.
 _COLUMNS = {
-    "clip": "",
-    "frames": "frames",
-    "time scale": "time_scale",
-    "frames/s": "frames_per_second",
-    "slip mm/s": "stance_slip_median_mps",
-    "sunk mm": "penetration_max_m",
-    "limits": "joint_limit_violations",
-    "speed ratio": "joint_speed_ratio_max",
-    "toe error mm": "toe_error_rmse_m",
-    "correction mm": "correction_rmse_m",
+    "frames": ("frames", 1.0, 0),
+    "time scale": ("time_scale", 1.0, 2),
+    "frames/s": ("frames_per_second", 1.0, 0),
+    "slip mm/s": ("stance_slip_median_mps", 1e3, 2),
+    "sunk mm": ("penetration_max_m", 1e3, 2),
+    "limits": ("joint_limit_violations", 1.0, 0),
+    "speed ratio": ("joint_speed_ratio_max", 1.0, 2),
+    "toe error mm": ("toe_error_rmse_m", 1e3, 2),
+    "correction mm": ("correction_rmse_m", 1e3, 2),
 }
 
 
-def _row(outcome: "Outcome") -> list[str]:
-    figures = _figures(outcome)
-    row = [outcome.segment.name + MARK * bool(figures["warnings"])]
-    for column, key in list(_COLUMNS.items())[1:]:
-        value = figures[key]
-        if isinstance(value, float):
-            value = value * 1000 if " mm" in column else value
-            value = f"{value:.0f}" if column == "frames/s" else f"{value:.2f}"
-        row.append("-" if value is None else str(value))
-    return row
+def _cells(report: "RetargetReport") -> list[str]:
+    values = [(getattr(report, key), by, n) for key, by, n in _COLUMNS.values()]
+    return ["-" if x is None else f"{x * by:.{digits}f}" for x, by, digits in values]

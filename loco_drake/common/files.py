@@ -4,6 +4,7 @@ import hashlib
 import json
 import math
 import os
+import re
 import shutil
 import stat
 import tempfile
@@ -19,6 +20,11 @@ from loco_drake.common.errors import InputError
 # Figures that depend on the machine or its load, and the hash itself.
 TIMES = ("real_time_factor", "frames_per_second", "wall_clock_s", "seconds", "sha256")
 _MAX_JSON_BYTES = 64 * 2**20
+# Of recordings, those known here have up to 3 MB, 90 s; this is enough for 25 minutes.
+_MAX_TEXT_BYTES = 50_000_000
+
+# The marks that spreadsheets put before a text, and what they say of it.
+_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 
 
 @contextmanager
@@ -157,6 +163,44 @@ def read_json(path: Path) -> dict[str, Any]:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"{path} is damaged: it is no JSON ({reason}).") from None
+
+
+def read_text(path: Path) -> str:
+    r"""Returns a text file, UTF-8 or with the mark of UTF-16, lines ending in ``\n``.
+
+    Raises:
+        InputError: if the file cannot be read, is binary or larger than 50 MB.
+    """
+    try:
+        if not path.is_file():
+            raise InputError(f"There is no file {str(path)!r}.")
+        with path.open("rb") as file:
+            content = file.read(_MAX_TEXT_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    if len(content) > _MAX_TEXT_BYTES:
+        megabytes = _MAX_TEXT_BYTES // 10**6
+        raise InputError(f"{path} is larger than {megabytes} MB.")
+    encoding = next((_MARKS[m] for m in _MARKS if content.startswith(m)), "utf-8")
+    try:
+        text = content.decode(encoding)
+    except UnicodeDecodeError:
+        text = "\0"
+    if "\0" in text:
+        raise InputError(f"{path} is not plain text.")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def is_inside(name: str) -> bool:
+    """Says whether a relative path, written with ``/``, stays inside its folder.
+
+    Names that another system would take for a drive or a folder are not inside.
+    """
+    return (
+        len(name) <= 200
+        and not re.search(r"[\x00-\x1f\x7f\\:]", name)
+        and all(part.strip(". ") for part in name.split("/"))
+    )
 
 
 def content_sha256(header: Mapping[str, Any], parts: Mapping[str, bytes]) -> str:

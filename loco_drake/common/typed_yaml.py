@@ -6,9 +6,10 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
+import yaml
 from pydrake.common.yaml import yaml_load
 
-from loco_drake.common.errors import InputError
+from loco_drake.common.errors import InputError, quoted
 
 T = TypeVar("T")
 
@@ -36,6 +37,7 @@ def read_yaml(path: Path, schema: type[T], what: str) -> T:
         if path.stat().st_size > _MAX_BYTES:
             raise InputError(f"it has more than {_MAX_BYTES // 1000} kB")
         text = path.read_text(encoding="utf-8-sig")
+        refuse_repeated_keys(text)
         data = yaml_load(data=text) if text.strip() else {}
         result: T = _convert(data, schema, "it")
     except RecursionError:
@@ -48,6 +50,30 @@ def read_yaml(path: Path, schema: type[T], what: str) -> T:
             reason = reason[:_MAX_REASON] + "..."
         raise InputError(f"{path} is not {what}: {reason}.") from None
     return result
+
+
+def refuse_repeated_keys(text: str) -> None:
+    """Raises InputError if a mapping names a key twice, of which Drake takes the last.
+
+    Raises:
+        yaml.YAMLError: if it is no YAML.
+    """
+    nodes = [yaml.compose(text, Loader=yaml.SafeLoader)]
+    seen: set[int] = set()
+    for node in nodes:  # grows, by each node once, however many aliases it has
+        if id(node) in seen:
+            continue
+        seen.add(id(node))
+        if isinstance(node, yaml.SequenceNode):
+            nodes += node.value
+        elif isinstance(node, yaml.MappingNode):
+            names: set[str] = set()
+            for key, value in node.value:
+                name, line = str(key.value), key.start_mark.line + 1
+                if name in names:
+                    raise InputError(f"line {line} names {quoted(name)} a second time")
+                names.add(name)
+                nodes.append(value)
 
 
 def _convert(value: Any, kind: Any, where: str) -> Any:

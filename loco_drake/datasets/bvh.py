@@ -2,57 +2,39 @@
 
 import re
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from loco_drake.common.errors import InputError
-from loco_drake.datasets.text import (
+from loco_drake.datasets.recording import (
     LARGEST,
+    Array,
     parse_numbers,
-    read_lines,
     refuse_decimal_commas,
 )
-
-Array = NDArray[np.float64]
 
 END_SITE = "End Site"
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A node of the skeleton.
+    """A node of the skeleton."""
 
-    Attributes:
-        name: :data:`END_SITE` for the end of a chain.
-        parent: index of the node it hangs on, -1 for the root.
-        offset: from the parent in the parent's frame, in the file's unit.
-        channels: names of the numbers that move it, such as ``Zrotation``, in order.
-        first: column of the first of them.
-    """
-
-    name: str
-    parent: int
-    offset: tuple[float, float, float]
-    channels: tuple[str, ...]
-    first: int
+    name: str  # END_SITE for the end of a chain
+    parent: int  # index of the node it hangs on, -1 for the root
+    offset: tuple[float, float, float]  # in the parent's frame, in the file's unit
+    channels: tuple[str, ...]  # of the numbers that move it: Zrotation, ...; in order
+    first: int  # column of the first of them
 
 
 @dataclass(frozen=True)
 class Bvh:
-    """A recording.
+    """A recording."""
 
-    Attributes:
-        joints: parents before children, in the file's order.
-        motion: one row of all channels for each frame, shape (T, channels).
-        fps: frames per second.
-    """
-
-    joints: list[Joint]
-    motion: Array
-    fps: float
+    joints: list[Joint]  # parents before children, in the file's order
+    motion: Array  # one row of all channels for each frame, shape (T, channels)
+    fps: float  # frames per second
 
     def positions(self) -> Array:
         """Returns joint positions by forward kinematics, shape (T, J, 3).
@@ -111,55 +93,40 @@ class Bvh:
         return index == ancestor
 
 
-def read_bvh(path: Path, what: str) -> Bvh:
-    """Returns a BVH file.
-
-    Args:
-        path: the file.
-        what: the format, for messages: "a BVH file of the dog".
+def parse_bvh(lines: list[str]) -> Bvh:
+    """Returns what the lines of a BVH file say.
 
     Raises:
         InputError: if it is no BVH file, holds fewer or more frames than it says, or
             something other than finite numbers, or angles in radians.
     """
-    lines = read_lines(path, what)
     heads = [k for k, line in enumerate(lines) if line.strip().upper() == "MOTION"]
     whole = len(heads) == 1 and len(lines) >= heads[0] + 4
     if lines[0].strip().upper() != "HIERARCHY" or not whole:
-        raise InputError(
-            f"{path} is not {what}: it lacks HIERARCHY, or MOTION with its frames."
-        )
+        raise InputError("it lacks HIERARCHY, or MOTION with its frames.")
     (head,) = heads
     try:
         joints = _parse_hierarchy("\n".join(lines[1:head]).split())
     except (ValueError, IndexError):
-        raise InputError(f"{path} is not {what}: its HIERARCHY is damaged.") from None
-    refuse_decimal_commas(lines[head + 3], path, what)
-    frames = _header_value(lines[head + 1], "Frames", path, what)
-    step = _header_value(lines[head + 2], "Frame Time", path, what)
+        raise InputError("its HIERARCHY is damaged.") from None
+    refuse_decimal_commas(lines[head + 3])
+    frames = _header_value(lines[head + 1], "Frames")
+    step = _header_value(lines[head + 2], "Frame Time")
     columns = sum(len(joint.channels) for joint in joints)
     rows = [line.split() for line in lines[head + 3 :]]
     for number, row in enumerate(rows, start=head + 4):
         if len(row) != columns:
             raise InputError(
-                f"{path} is not {what}: line {number} has {len(row)} numbers instead "
-                f"of {columns}."
+                f"line {number} has {len(row)} numbers instead of {columns}."
             )
-    joined = [",".join(row) for row in rows]
-    motion = parse_numbers(joined, head + 4, columns, path, what)
+    motion = parse_numbers([",".join(row) for row in rows], head + 4, columns)
     if len(motion) != frames:
-        raise InputError(
-            f"{path} is not {what}: it holds {len(motion)} frames but says {frames:g}."
-        )
-    finite = np.isfinite(motion).all(axis=1)
-    if not finite.all():
-        line = int(np.argmin(finite)) + head + 4
-        raise InputError(f"{path} is not {what}: line {line} holds NaN or infinity.")
-    _refuse_radians(joints, motion, path, what)
+        raise InputError(f"it holds {len(motion)} frames but says {frames:g}.")
+    _refuse_radians(joints, motion)
     return Bvh(joints, motion, 1 / step)
 
 
-def _refuse_radians(joints: list[Joint], motion: Array, path: Path, what: str) -> None:
+def _refuse_radians(joints: list[Joint], motion: Array) -> None:
     """Raises InputError if no joint but the root ever turns by more than 2 pi.
 
     Legs that walk turn by tens of degrees, so such angles are in radians.
@@ -174,15 +141,15 @@ def _refuse_radians(joints: list[Joint], motion: Array, path: Path, what: str) -
     largest = np.abs(motion[:, columns]).max(initial=0.0)
     if 0.3 < largest <= 2 * np.pi and len(motion) > 1:
         raise InputError(
-            f"{path} is not {what}: its joints turn by {largest:.3g} at most, which "
-            "looks like radians; BVH has degrees."
+            f"its joints turn by {largest:.3g} at most, which looks like radians; BVH "
+            "has degrees."
         )
 
 
-def _header_value(line: str, name: str, path: Path, what: str) -> float:
+def _header_value(line: str, name: str) -> float:
     """Returns the number of a line such as ``Frames: 593``, above 0."""
     label, _, text = line.partition(":")
-    refuse_decimal_commas(f"{text} {text}", path, what)
+    refuse_decimal_commas(f"{text} {text}")
     try:
         value = float(text)
     except ValueError:
@@ -190,7 +157,7 @@ def _header_value(line: str, name: str, path: Path, what: str) -> float:
     if "".join(label.lower().split()) != name.lower().replace(" ", "") or not (
         0 < value < float("inf")
     ):
-        raise InputError(f"{path} is not {what}: its MOTION lacks {name!r}.")
+        raise InputError(f"its MOTION lacks {name!r}.")
     return value
 
 

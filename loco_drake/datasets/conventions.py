@@ -8,7 +8,6 @@ are checked here.
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -33,11 +32,10 @@ ASKEW = 0.5
 SIDEWAYS, LENGTHWISE = 0.02, 0.1
 # Orders of withers, hip and toes in which front and rear are exchanged.
 TURNED = {
-    (0, 1, 4, 5, 2, 3): "toes",
-    (1, 0, 2, 3, 4, 5): "trunk",
-    (1, 0, 4, 5, 2, 3): "trunk and toes",
+    "toes": [0, 1, 4, 5, 2, 3],
+    "trunk": [1, 0, 2, 3, 4, 5],
+    "trunk and toes": [1, 0, 4, 5, 2, 3],
 }
-TOES_EXCHANGED, TRUNK_EXCHANGED, BOTH_EXCHANGED = TURNED
 # Markers of standing toes sit this low or high in each recording; the tenth percentile
 # of a toe's height lies well within stance, which is a quarter of a gallop.
 STANCE_PERCENTILE = 10.0
@@ -57,30 +55,25 @@ STILL = 0.01
 FASTEST = 10.0
 
 
-def measure(recording: Recording, body: Body, path: Path) -> Recording:
+def measure(recording: Recording, body: Body) -> Recording:
     """Returns a recording with corrected conventions, checked against its body.
-
-    Args:
-        recording: as a reader returns it.
-        body: bounds of its source.
-        path: the file, for messages.
 
     Raises:
         InputError: if the recording is implausible; names the frame or the figure.
     """
     points, notes = recording.points, dict(recording.notes)
     if points.shape[1:] != (6, 3) or not np.isfinite(points).all():
-        raise InputError(f"{path} lacks points of the body.")
-    check_rate(recording.fps, str(path))
-    upright = orient(points, body, path, notes)
-    points = put_on_ground(upright, body, notes)
+        raise InputError("it lacks points of the body.")
+    check_rate(recording.fps)
+    upright = orient(points, body, notes)
+    points = _put_on_ground(upright, body, notes)
     recording = replace(recording, points=points, notes=notes)
-    check_motion(recording, body, path)
-    _check_level(upright, path)
+    _check_motion(recording, body)
+    _check_level(upright)
     return recording
 
 
-def orient(points: Array, body: Body, path: Path, notes: dict[str, str]) -> Array:
+def orient(points: Array, body: Body, notes: dict[str, str]) -> Array:
     """Returns points (T, 6, 3) with z up and toes in order.
 
     Readers may call it themselves; correct points do not change.
@@ -88,17 +81,16 @@ def orient(points: Array, body: Body, path: Path, notes: dict[str, str]) -> Arra
     Args:
         points: withers, hip, toes FL, FR, RL, RR in m; NaN where one is missing.
         body: bounds of its size.
-        path: the file, for messages.
         notes: receives the corrections.
 
     Raises:
         InputError: if the up axis is unclear, the size is implausible, or there are too
             few frames.
     """
-    check_frames(points, path)
+    check_frames(points)
     if not all_seen(points).any():
         return points
-    points = _turn_up(points, path, notes)
+    points = _turn_up(points, notes)
     seen = points[all_seen(points)]
     for name, value, (low, high) in (
         ("long", _trunk_length(seen), body.trunk),
@@ -106,25 +98,25 @@ def orient(points: Array, body: Body, path: Path, notes: dict[str, str]) -> Arra
     ):
         if not low <= value <= high:
             raise InputError(
-                f"{path}: the trunk would be {value:.3g} m {name}, not {low} to {high} "
-                "m (is the unit of length that of the format?)."
+                f"the trunk would be {value:.3g} m {name}, not {low} to {high} m (is "
+                "the unit of length that of the format?)."
             )
     return _name_toes(points, notes)
 
 
-def _turn_up(points: Array, path: Path, notes: dict[str, str]) -> Array:
+def _turn_up(points: Array, notes: dict[str, str]) -> Array:
     seen = points[all_seen(points)]
     up = np.median(seen[:, :2].mean(axis=1) - np.median(seen[:, 2:], axis=1), axis=0)
     if not np.linalg.norm(up) > 0 or not _trunk_length(seen) > 0:
-        raise InputError(f"{path}: the trunk has no length, or is in the ground.")
+        raise InputError("the trunk has no length, or is in the ground.")
     cosines = up / np.linalg.norm(up)
     axis = int(np.argmax(np.abs(cosines)))
     if abs(cosines[axis]) < UPRIGHT:
         if cosines[2] > ASKEW:
             return points
         raise InputError(
-            f"{path}: which way is up cannot be told, since along no axis is the trunk "
-            "above the toes (are the columns those of the format?)."
+            "which way is up cannot be told, since along no axis is the trunk above "
+            "the toes (are the columns those of the format?)."
         )
     if axis == 2 and cosines[2] > 0:
         return points
@@ -141,15 +133,15 @@ def _name_toes(points: Array, notes: dict[str, str]) -> Array:
     """
     ahead, left, way = _offsets(points)
     crossed = left[[0, 2]] - left[[1, 3]] < -SIDEWAYS
-    order = None
+    what = None
     if ahead[:2].mean() - ahead[2:].mean() < -LENGTHWISE:
         toes = not crossed.all() if abs(way) < 1 else way > 0
-        order = TOES_EXCHANGED if toes else TRUNK_EXCHANGED
+        what = "toes" if toes else "trunk"
     elif crossed.all() and way < -1:
-        order = BOTH_EXCHANGED
-    if order is not None:
-        notes["turned"] = f"front and rear of {TURNED[order]} exchanged"
-        points = points[:, order]
+        what = "trunk and toes"
+    if what is not None:
+        notes["turned"] = f"front and rear of {what} exchanged"
+        points = points[:, TURNED[what]]
         _, left, _ = _offsets(points)
     points, swapped = points.copy(), []
     for name, k in (("front", 2), ("rear", 4)):
@@ -204,7 +196,7 @@ def ground_height(points: Array) -> float:
     return ground if abs(ground) > GROUND * _size(points) else 0.0
 
 
-def _check_level(points: Array, path: Path) -> None:
+def _check_level(points: Array) -> None:
     """Raises InputError if the toes in stance are on a slope."""
     toes = points[1:, 2:]
     steps = np.linalg.norm(np.diff(points[:, 2:], axis=0), axis=-1)
@@ -216,12 +208,12 @@ def _check_level(points: Array, path: Path) -> None:
         slope = np.degrees(np.arctan(np.linalg.norm(gradient)))
         if slope > MAX_SLOPE:
             raise InputError(
-                f"{path}: the ground slopes by {slope:.0f} degrees, so that no axis of "
-                "the file points up."
+                f"the ground slopes by {slope:.0f} degrees, so that no axis of the "
+                "file points up."
             )
 
 
-def put_on_ground(points: Array, body: Body, notes: dict[str, str]) -> Array:
+def _put_on_ground(points: Array, body: Body, notes: dict[str, str]) -> Array:
     """Returns points (T, 6, 3) with the ground at z = 0.
 
     Shifts trunk and toes, then each marker toe by its remaining offset.
@@ -236,13 +228,8 @@ def put_on_ground(points: Array, body: Body, notes: dict[str, str]) -> Array:
     return points
 
 
-def check_motion(recording: Recording, body: Body, path: Path) -> None:
-    """Checks that the motion of a recording, z up, is plausible for its body.
-
-    Raises:
-        InputError: if steps, reach of the legs, speed or the rhythm of the strides
-            cannot be; names the first frame, or the figure.
-    """
+def _check_motion(recording: Recording, body: Body) -> None:
+    """Raises InputError unless the motion of a recording, z up, suits its body."""
     points, fps = recording.points, recording.fps
     trunk = np.linalg.norm(points[:, 0] - points[:, 1], axis=-1) / _trunk_length(points)
     size = _size(points)
@@ -258,7 +245,7 @@ def check_motion(recording: Recording, body: Body, path: Path) -> None:
     }.items():
         if wrong.any():
             frame = recording.first + int(np.argmax(wrong.any(axis=1)))
-            raise InputError(f"{path}: at frame {frame} {reason}.")
+            raise InputError(f"at frame {frame} {reason}.")
 
     height = _height(points)
     unit = np.sqrt(height / GRAVITY)
@@ -271,7 +258,7 @@ def check_motion(recording: Recording, body: Body, path: Path) -> None:
     ):
         stride = "" if period is None else f"with strides of {period / fps:.3g} s "
         raise InputError(
-            f"{path}: at {fps:g} frames/s the body would move {stride}at {speed:.3g} "
+            f"at {fps:g} frames/s the body would move {stride}at {speed:.3g} "
             "m/s, which is not plausible; give its true rate with --fps."
         )
 

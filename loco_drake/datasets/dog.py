@@ -11,14 +11,17 @@ of a standing dog near y = 0:
 from pathlib import Path
 
 from loco_drake.common.errors import InputError
-from loco_drake.datasets.bvh import END_SITE, read_bvh
-from loco_drake.datasets.recording import Array, Body, Recording
-from loco_drake.datasets.text import read_lines, read_table
+from loco_drake.datasets.bvh import END_SITE, parse_bvh
+from loco_drake.datasets.recording import (
+    Array,
+    Body,
+    Recording,
+    read_lines,
+    read_table,
+)
 
 FPS = 60.0
 COLUMNS = 81
-FORMAT = "a dog keypoint file"
-BVH_FORMAT = "a BVH file of the dog"
 
 # Indices of withers, hip, toes FL, FR, RL, RR. The withers are the base of the neck,
 # which lies on the spine like the hip. The shoulder points (6, 11) are 3 cm lower and
@@ -49,25 +52,18 @@ def read_dog(
     Raises:
         InputError: if the file is not of this format.
     """
-    if path.suffix.lower() == ".bvh" or _is_bvh(path):
-        return _read_bvh(path, fps)
-    points = read_table(path, COLUMNS, FORMAT).reshape(-1, COLUMNS // 3, 3)
-    return Recording(_z_up(points[:, POINTS]), fps or FPS)
-
-
-def _is_bvh(path: Path) -> bool:
-    return read_lines(path, FORMAT)[0].strip().upper() == "HIERARCHY"
-
-
-def _read_bvh(path: Path, fps: float | None) -> Recording:
-    bvh = read_bvh(path, BVH_FORMAT)
+    lines = read_lines(path)
+    if path.suffix.lower() != ".bvh" and lines[0].strip().upper() != "HIERARCHY":
+        points = read_table(path, COLUMNS).reshape(-1, COLUMNS // 3, 3)
+        return Recording(_z_up(points[:, POINTS]), fps or FPS)
+    bvh = parse_bvh(lines)
     try:
         found = [bvh.find(chain) for chain in CHAINS]
     except LookupError as missing:
         names = dict.fromkeys(name for chain in CHAINS for name in chain)
         raise InputError(
-            f"{path} is not {BVH_FORMAT}: its skeleton is another, which lacks "
-            f"{missing} where a dog's has it; that has the joints "
+            f"its skeleton is another, which lacks {missing} where a dog's has it; "
+            "that has the joints "
             f"{', '.join(name for name in names if name != END_SITE)}."
         ) from None
     points = bvh.positions()[:, found] / 100

@@ -13,8 +13,8 @@ import pooch
 import requests
 
 from loco_drake.common.errors import InputError
+from loco_drake.common.files import is_inside, read_text
 from loco_drake.datasets.registry import DATASETS
-from loco_drake.datasets.text import is_inside, read_text
 
 MANIFEST = Path(__file__).with_name("manifest.csv")
 # What each column of a manifest holds, beside the names of the file here and there.
@@ -33,19 +33,12 @@ pooch.get_logger().setLevel("ERROR")
 
 @dataclass(frozen=True)
 class RemoteFile:
-    """One file of a recording as its authors, or others, published it.
+    """One file of a recording as its authors, or others, published it."""
 
-    Attributes:
-        name: its path inside the data folder, with ``/``; begins with the dataset's.
-        url: address of the content, which no later commit can change.
-        size: bytes.
-        sha256: checksum of the content, in hexadecimal.
-    """
-
-    name: str
-    url: str
-    size: int
-    sha256: str
+    name: str  # its path inside the data folder, with "/"; begins with the dataset's
+    url: str  # address of the content, which no later commit can change
+    size: int  # bytes
+    sha256: str  # checksum of the content, in hexadecimal
 
     def is_present(self, folder: Path) -> bool:
         """Says whether the data folder has the file with the right content."""
@@ -65,7 +58,7 @@ def read_manifest(path: Path) -> list[RemoteFile]:
             folder, or one that another line names, too.
     """
     files: dict[str, RemoteFile] = {}
-    reader = csv.reader(io.StringIO(read_text(path, "a manifest"), newline=""))
+    reader = csv.reader(io.StringIO(read_text(path), newline=""))
     try:
         header = next(reader, [])
         for cells in reader:

@@ -35,11 +35,12 @@ from loco_drake.datasets.recording import (
     check_range,
     check_rate,
     check_told,
+    read_lines,
+    read_named_table,
+    read_table,
 )
-from loco_drake.datasets.text import read_lines, read_named_table, read_table
 from loco_drake.datasets.treadmill import trunk_path
 
-FORMAT = "a horse keypoint file"
 MARKERS = ("Head", "Withers", "Sacrum", "HFL", "HFR", "HHL", "HHR")
 RAW_COLUMNS = ("Time", *(f"{marker}{axis}" for marker in MARKERS for axis in "XYZ"))
 
@@ -78,50 +79,49 @@ def read_horse(
         InputError: if the file is not of this format, the stretch not within it or has
             long gaps, its rate is not to be found, or ``fps`` not that of its strides.
     """
-    points, own_fps = _read_raw(path) if _has_header(path) else _read_world(path)
+    header = read_lines(path)[0].lower().replace("nan", "").replace("inf", "")
+    own_fps: float | None = None
+    if re.search("[a-df-z]", header):  # words
+        points, own_fps = _read_raw(path)
+    else:
+        points = read_table(path, 3 * len(MARKERS)).reshape(-1, len(MARKERS), 3)[:, 1:]
     notes: dict[str, str] = {}
-    points = orient(points, BODY, path, notes)
+    points = orient(points, BODY, notes)
     day = re.search(r"_M([123])(?![0-9])", path.stem)
     rate = fps or own_fps or (RATE_OF_DAY[day[1]] if day else None)
-    told = infer_rate(points)
+    told = _infer_rate(points)
     if told is not None:
-        rate = check_told(told, rate, path, FORMAT)
+        rate = check_told(told, rate)
     if rate is None:
         raise InputError(
-            f"{path} does not tell its rate: its name has no day of measurement (_M1_, "
-            "_M2_ or _M3_) and its strides are too few, or not those of a horse; give "
-            "its frames per second with --fps 60 or --fps 120."
+            "it does not tell its rate: its name has no day of measurement (_M1_, _M2_ "
+            "or _M3_) and its strides are too few, or not those of a horse; give its "
+            "frames per second with --fps 60 or --fps 120."
         )
-    points, bridged = mend_gaps(points, round(LONGEST_GAP * rate))
+    points, bridged = _mend_gaps(points, round(LONGEST_GAP * rate))
     if bridged:
         notes["gaps"] = f"{bridged} frames bridged"
-    whole, first = usable_stretch(points, start, end, path.name)
+    whole, first = _usable_stretch(points, start, end)
     points = points[whole]
     moved = points - points[:, :1] * (1.0, 1.0, 0.0)
     moved[..., :2] += trunk_path(points[:, 0], points[:, 2:], rate)[:, None]
     return Recording(moved, rate, whole.start, first, notes)
 
 
-def _has_header(path: Path) -> bool:
-    """Returns whether the first line holds words."""
-    first = read_lines(path, FORMAT)[0].lower().replace("nan", "").replace("inf", "")
-    return re.search("[a-df-z]", first) is not None
-
-
-def _read_raw(path: Path) -> tuple[Array, float | None]:
-    table = read_named_table(path, RAW_COLUMNS, FORMAT)
+def _read_raw(path: Path) -> tuple[Array, float]:
+    table = read_named_table(path, RAW_COLUMNS)
     time = table[:, 0]
-    check_frames(time, path)
+    check_frames(time)
     if not np.isfinite(time).all():
-        raise InputError(f"{path} is not {FORMAT}: its time column is incomplete.")
+        raise InputError("its time column is incomplete.")
     step = (time[-1] - time[0]) / (len(time) - 1)
-    rate = check_rate(1 / step, str(path)) if step > 0 else 0.0
+    rate = check_rate(1 / step) if step > 0 else 0.0
     regular = np.abs(time - (time[0] + step * np.arange(len(time)))) < TIME_TOLERANCE
     if not rate or not regular.all():
         line = int(np.argmin(regular)) + 2
         raise InputError(
-            f"{path} is not {FORMAT}: at line {line} the time does not go on evenly "
-            "(are lines missing or out of order?)."
+            f"at line {line} the time does not go on evenly (are lines missing or out "
+            "of order?)."
         )
     points = table[:, 1:].reshape(-1, len(MARKERS), 3)[:, 1:] / 1000
     # Whole frames per second, as far as 1 ms in the duration lets them be told.
@@ -129,12 +129,7 @@ def _read_raw(path: Path) -> tuple[Array, float | None]:
     return points, whole if abs(whole / rate - 1) < 0.02 else rate
 
 
-def _read_world(path: Path) -> tuple[Array, None]:
-    points = read_table(path, 3 * len(MARKERS), FORMAT).reshape(-1, len(MARKERS), 3)
-    return points[:, 1:], None
-
-
-def infer_rate(points: Array) -> float | None:
+def _infer_rate(points: Array) -> float | None:
     """Returns the rate at which the strides in points (T, 6, 3) match a horse's.
 
     Animals of similar build have similar strides when time is scaled by sqrt(height /
@@ -158,15 +153,10 @@ def infer_rate(points: Array) -> float | None:
     return best if ratios[best] < np.log(MAX_RATIO) else None
 
 
-def mend_gaps(points: Array, longest: int) -> tuple[Array, int]:
-    """Returns points with short gaps bridged by cubic splines.
+def _mend_gaps(points: Array, longest: int) -> tuple[Array, int]:
+    """Returns points (T, N, 3) with short gaps bridged by splines, and their frames.
 
-    Args:
-        points: shape (T, N, 3), NaN where a marker was not seen.
-        longest: frames that a gap may have to be bridged; none at an end is.
-
-    Returns:
-        The points, and how many frames were bridged.
+    Gaps at an end, or of more than ``longest`` frames, stay.
     """
     points = points.copy()
     bridged = np.zeros(len(points), dtype=bool)
@@ -183,36 +173,26 @@ def mend_gaps(points: Array, longest: int) -> tuple[Array, int]:
     return points, int(bridged.sum())
 
 
-def usable_stretch(
-    points: Array, start: int | None, end: int | None, name: str
+def _usable_stretch(
+    points: Array, start: int | None, end: int | None
 ) -> tuple[slice, int]:
     """Returns the frames without gaps around a stretch, and its first frame.
 
-    Args:
-        points: shape (T, N, 3), NaN where a marker was not seen.
-        start: first frame asked for, None for any.
-        end: frame after the last one asked for, None for any.
-        name: of the file, for messages.
-
-    Returns:
-        All frames around the stretch without a gap, and its first frame. Without
-        ``start`` and ``end`` it is the longest there is.
-
-    Raises:
-        InputError: if the stretch does not lie within the file, or has a gap.
+    Without ``start`` and ``end`` it is the longest there is. Raises InputError if it
+    does not lie within the file, or has a gap.
     """
     whole = all_seen(points)
     runs = list(intervals(whole))
     if not runs:
-        raise InputError(f"{name} has no frame in which all markers were seen.")
+        raise InputError("it has no frame in which all markers were seen.")
     longest = max(runs, key=lambda run: run[1] - run[0])
     if start is None and end is None:
         return slice(*longest), longest[0]
-    first, stop = check_range(start, end, len(points), name)
+    first, stop = check_range(start, end, len(points))
     for run in runs:
         if run[0] <= first and stop <= run[1]:
             return slice(*run), first
     raise InputError(
-        f"Markers are missing within frames {first} to {stop} of {name}; its longest "
+        f"markers are missing within frames {first} to {stop} of it; its longest "
         f"stretch without long gaps is {longest[0]} to {longest[1]}."
     )

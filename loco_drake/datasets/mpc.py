@@ -18,7 +18,6 @@ from loco_drake.datasets.simulated import read_robot
 
 Bools = NDArray[np.bool_]
 
-FORMAT = "an mpc keypoint file"
 # Of the front left hip in the trunk's frame, m.
 HALF_SIZE = (0.1505, 0.044)
 
@@ -52,30 +51,24 @@ def read_mpc(
         InputError: if the file is not of this format, or its rate not to be found or
             not that of its swings.
     """
-    points = read_robot(path, FORMAT, HALF_SIZE, centre=4, hips=5, feet=0)
+    points = read_robot(path, HALF_SIZE, centre=4, hips=5, feet=0)
     notes: dict[str, str] = {}
-    points = orient(points, BODY, path, notes)
-    rate = infer_rate(points[:, 2:], path, fps)
-    ground = stance_height(points[:, 2:])
+    points = orient(points, BODY, notes)
+    rate = _infer_rate(points[:, 2:], fps)
+    feet = points[:, 2:]
+    still = _still(feet)
+    ground = float(np.median(feet[1:, :, 2][still])) if still.any() else 0.0
     if abs(ground) > GROUND:
         notes["ground"] = f"moved from z = {ground:.3f} m to 0"
     return Recording(points - np.array([0.0, 0.0, ground]), rate, notes=notes)
 
 
-def stance_height(feet: Array) -> float:
-    """Returns the median height in m of the feet (T, 4, 3) that stand still."""
-    still = _still(feet)
-    return float(np.median(feet[1:, :, 2][still])) if still.any() else 0.0
-
-
-def infer_rate(feet: Array, path: Path, fps: float | None) -> float:
+def _infer_rate(feet: Array, fps: float | None) -> float:
     """Returns the rate of feet (T, 4, 3) in frames/s, ``fps`` if it is plausible.
 
     The controller swings every foot for a fixed time, so the number of frames of a
     whole swing gives the rate. Without a whole swing, the length of the run does.
-
-    Raises:
-        InputError: if neither tells, or the swings contradict ``fps``.
+    Raises InputError if neither tells, or the swings contradict ``fps``.
     """
     still = _still(feet)
     swings = _whole_runs(~still)
@@ -91,15 +84,15 @@ def infer_rate(feet: Array, path: Path, fps: float | None) -> float:
         }
         best = min(RATES, key=lambda rate: errors[rate])
         if errors[best] <= SWING_TOLERANCE:
-            return check_told(best, fps, path, FORMAT)
+            return check_told(best, fps)
     if fps is not None:
         return fps
     for rate in RATES:
         if len(feet) == round(rate * RUN_SECONDS):
             return rate
     raise InputError(
-        f"{path} does not tell its rate, since no foot swings in it as this controller "
-        "has it; give its frames per second with --fps 100 or --fps 200."
+        "it does not tell its rate, since no foot swings in it as this controller has "
+        "it; give its frames per second with --fps 100 or --fps 200."
     )
 
 

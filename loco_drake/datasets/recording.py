@@ -1,6 +1,11 @@
-"""Recording, the result of a reader, and Body, the bounds of its source."""
+"""Recording, the result of a reader; Body, the bounds of its source; numeric tables.
 
-from collections.abc import Sized
+Many forms of a table are read, none is guessed at. Reasons to refuse a file do not name
+it: :func:`loco_drake.datasets.registry.read_clip` does.
+"""
+
+import re
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -8,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError
+from loco_drake.common.files import read_text
 
 Array = NDArray[np.float64]
 
@@ -15,6 +21,10 @@ Array = NDArray[np.float64]
 RATES = (10.0, 1000.0)
 # Needed for interpolation.
 MIN_FRAMES = 4
+# No coordinate, angle or time of a recording is this large, in any unit.
+LARGEST = 1e7
+
+_DECIMAL_COMMA = re.compile(r'\d,\d+"?[;\s]\s*"?[-+]?\d+,\d|"[-+]?\d+,\d')
 
 
 @dataclass(frozen=True)
@@ -23,72 +33,46 @@ class Recording:
 
     Up axis, ground and the order of toes need not follow the conventions, since
     :mod:`loco_drake.datasets.conventions` measures them.
-
-    Attributes:
-        points: withers, hip, toes FL, FR, RL, RR, shape (T, 6, 3).
-        fps: frames per second.
-        first: number in the file of the first of these frames.
-        start: number in the file of the first usable frame, the default start.
-        notes: corrections, for the clip's provenance.
     """
 
-    points: Array
-    fps: float
-    first: int = 0
+    points: Array  # withers, hip, toes FL, FR, RL, RR, shape (T, 6, 3)
+    fps: float  # frames per second
+    first: int = 0  # number in the file of the first of these frames
+    # Number in the file of the first usable frame, the default start.
     start: int | None = None
+    # Corrections, for the clip's provenance.
     notes: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Body:
-    """Bounds that all recordings of a source satisfy.
+    """Bounds that all recordings of a source satisfy."""
 
-    Attributes:
-        trunk: range of the distance between withers and hip, m.
-        height: range of the height of the trunk's middle over the toes in stance, m.
-        stride: range of the stride period, in units of sqrt(height / g).
-        jump: largest deviation of a toe from linear extrapolation of its last two
-            frames, as a share of the larger of trunk and height.
-        markers: whether toes are markers with individual height offsets, rather than
-            exact points.
-    """
-
+    # Range of the distance between withers and hip, m.
     trunk: tuple[float, float] = (0.03, 5.0)
+    # Range of the height of the trunk's middle over the toes in stance, m.
     height: tuple[float, float] = (0.03, 5.0)
+    # Range of the stride period, in units of sqrt(height / g).
     stride: tuple[float, float] = (0.5, 10.0)
+    # Largest deviation of a toe from linear extrapolation of its last two frames, as a
+    # share of the larger of trunk and height.
     jump: float = 0.4
+    # Whether toes are markers with individual height offsets, rather than exact points.
     markers: bool = True
 
 
-def check_rate(fps: float, of: str) -> float:
-    """Returns a rate in frames/s if it is plausible.
-
-    Args:
-        fps: the rate.
-        of: what has it, for the message.
-
-    Raises:
-        InputError: if not.
-    """
+def check_rate(fps: float) -> float:
+    """Returns a rate in frames/s; raises InputError if it is not plausible."""
     low, high = RATES
     if not low <= fps <= high:
         raise InputError(
-            f"{of} has {fps:g} frames/s, which is not plausible: a rate is {low:g} to "
-            f"{high:g} frames/s (is a time in ms, or a step given for a rate?)."
+            f"{fps:g} frames/s is not plausible: a rate is {low:g} to {high:g} "
+            "frames/s (is a time in ms, or a step given for a rate?)."
         )
     return fps
 
 
-def check_frames(frames: Sized, path: Path) -> None:
-    """Raises InputError if there are fewer than :data:`MIN_FRAMES` frames."""
-    if len(frames) < MIN_FRAMES:
-        raise InputError(
-            f"{path}: a recording needs at least {MIN_FRAMES} frames, not "
-            f"{len(frames)}."
-        )
-
-
-def check_told(told: float, fps: float | None, path: Path, what: str) -> float:
+def check_told(told: float, fps: float | None) -> float:
     """Returns the rate inferred from the motion, or the given one if it agrees.
 
     Raises:
@@ -96,21 +80,19 @@ def check_told(told: float, fps: float | None, path: Path, what: str) -> float:
     """
     if fps is not None and not 0.75 < fps / told < 4 / 3:
         raise InputError(
-            f"{path} is not {what} at {fps:g} frames/s: its motion tells that it has "
+            f"at {fps:g} frames/s it is none, as its motion tells that it has "
             f"{told:g}; leave the rate away, or correct it."
         )
     return told if fps is None else fps
 
 
-def all_seen(points: Array) -> NDArray[np.bool_]:
-    """Returns for each frame (T,) of ``points`` (T, ...) whether it is complete."""
-    flat = points.reshape(len(points), -1)
-    return np.asarray(np.isfinite(flat).all(axis=1), dtype=np.bool_)
+def check_frames(frames: Sized) -> None:
+    """Raises InputError if there are fewer than :data:`MIN_FRAMES` frames."""
+    if len(frames) < MIN_FRAMES:
+        raise InputError(f"it needs at least {MIN_FRAMES} frames, not {len(frames)}.")
 
 
-def check_range(
-    start: int | None, end: int | None, frames: int, what: str
-) -> tuple[int, int]:
+def check_range(start: int | None, end: int | None, frames: int) -> tuple[int, int]:
     """Returns ``(start, end)`` of a stretch, ``end`` exclusive.
 
     None stands for the first frame, or for the frame after the last.
@@ -122,31 +104,130 @@ def check_range(
     stop = frames if end is None else end
     if not 0 <= first < stop <= frames:
         raise InputError(
-            f"Frames {first} to {stop} (exclusive) do not lie within {what}, "
-            f"which has {frames} frames."
+            f"frames {first} to {stop} (exclusive) do not lie within the file, which "
+            f"has {frames} frames."
         )
     return first, stop
 
 
-def start_along_x(points: Array) -> Array:
-    """Returns points (T, 6, 3) turned and shifted so that they start along +x.
+def all_seen(points: Array) -> NDArray[np.bool_]:
+    """Returns in which frames (T,) of ``points`` (T, ...) nothing is missing."""
+    flat = points.reshape(len(points), -1)
+    return np.asarray(np.isfinite(flat).all(axis=1), dtype=np.bool_)
 
-    The first frame's horizontal direction from hip to withers becomes +x, the point
-    under the middle between them the origin; heights are left alone.
+
+def read_lines(path: Path) -> list[str]:
+    """Returns the lines of a text file, at least one, blank ones at the end left out.
 
     Raises:
-        InputError: if the trunk stands upright in the first frame, so that it has no
-            heading.
+        InputError: if the file cannot be read, is empty, binary or huge.
     """
-    withers, hip = points[0, 0], points[0, 1]
-    x, y, _ = withers - hip
-    length = np.hypot(x, y)
-    if length < 1e-6:
-        raise InputError(
-            "The clip starts with the withers right above the hip: it has no heading."
+    lines = read_text(path).rstrip().split("\n")
+    if not lines[0].strip():
+        raise InputError("it is empty.")
+    return lines
+
+
+def read_table(path: Path, columns: int) -> Array:
+    """Returns a table without header, shape (rows, ``columns``).
+
+    Its columns may be separated by commas, semicolons, tabs or spaces.
+
+    Raises:
+        InputError: if the file cannot be read, a line has another number of columns (a
+            last line cut off), or holds something other than finite numbers.
+    """
+    return parse_numbers(_with_commas(read_lines(path)), 1, columns)
+
+
+def read_named_table(path: Path, names: Sequence[str]) -> Array:
+    """Returns columns of a table with a header, shape (rows, ``len(names)``).
+
+    Args:
+        path: the file. A field that is empty or ``NaN`` is a gap, and NaN.
+        names: of the columns to return, in this order; quotes around them, upper and
+            lower case, and a ``#`` after them do not matter.
+
+    Raises:
+        InputError: if the file cannot be read, a column or all rows are lacking, a line
+            has another number of columns than the header, or something that is neither
+            a number nor a gap.
+    """
+    header, *rows = _with_commas(read_lines(path))
+    found = [name.strip().rstrip("#").lower() for name in header.split(",")]
+    missing = [name for name in names if name.lower() not in found]
+    if missing:
+        raise InputError(f"its header lacks {', '.join(missing)}.")
+    if not rows:
+        raise InputError("it holds nothing but a header.")
+    rows = [",".join(f.strip() or "nan" for f in row.split(",")) for row in rows]
+    table = parse_numbers(rows, 2, len(found), gaps=True)
+    return table[:, [found.index(name.lower()) for name in names]]
+
+
+def parse_numbers(
+    lines: list[str], first: int, columns: int, gaps: bool = False
+) -> Array:
+    """Returns the numbers of comma-separated lines, shape (lines, ``columns``).
+
+    Args:
+        lines: some of the file's, at least one.
+        first: number of the first of them in the file, for messages.
+        columns: how many numbers each must hold.
+        gaps: whether NaN is allowed.
+
+    Raises:
+        InputError: if a line has another number of columns, something other than a
+            finite number, or one beyond :data:`LARGEST`.
+    """
+    for number, line in enumerate(lines, first):
+        found = line.count(",") + 1
+        if found != columns:
+            cut = number == first + len(lines) - 1 and number > 1 and found < columns
+            raise InputError(
+                f"line {number} has {found} columns instead of {columns}"
+                + ("; it seems to be cut off." if cut else ".")
+            )
+    values = _parse(lines)
+    if values is None:
+        number = next(
+            n for n, line in enumerate(lines, first) if _parse([line]) is None
         )
-    c, s = x / length, y / length
-    R = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    origin = (withers + hip) / 2 * np.array([1.0, 1.0, 0.0])
-    along: Array = (points - origin) @ R.T
-    return along
+        raise InputError(f"line {number} holds something that is not a number.")
+    wrong = ~(np.abs(values) <= LARGEST)
+    if gaps:
+        wrong &= ~np.isnan(values)
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        value = values[row, column]
+        shown = f"{value:g}" if np.isfinite(value) else "NaN or infinity"
+        raise InputError(f"line {first + row} holds {shown}.")
+    return values
+
+
+def _parse(lines: list[str]) -> Array | None:
+    """Returns the numbers in ``lines``, or None if there is something else."""
+    try:
+        return np.loadtxt(lines, delimiter=",", comments=None, ndmin=2)
+    except ValueError:
+        return None
+
+
+def refuse_decimal_commas(text: str) -> None:
+    """Raises InputError if the numbers of a line are written with decimal commas."""
+    if _DECIMAL_COMMA.search(text):
+        raise InputError(
+            "its numbers have decimal commas, but must be written with points."
+        )
+
+
+def _with_commas(lines: list[str]) -> list[str]:
+    """Returns the lines of a table, separated by commas and without quotes."""
+    # Spreadsheets write empty rows.
+    while len(lines) > 1 and not lines[-1].strip(',;\t "'):
+        lines.pop()
+    for line in lines[:2]:
+        refuse_decimal_commas(line)
+    separator = next((s for s in ",;" if s in lines[0]), None)
+    plain = (line.replace('"', "") for line in lines)
+    return [",".join(line.split(separator)) for line in plain]

@@ -8,6 +8,8 @@ from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 
+import numpy as np
+
 from loco_drake.common.errors import InputError, check_choice, one_line
 from loco_drake.common.files import cache_dir
 from loco_drake.datasets import dog, horse, mpc, solo8
@@ -19,7 +21,6 @@ from loco_drake.datasets.recording import (
     check_frames,
     check_range,
     check_rate,
-    start_along_x,
 )
 from loco_drake.motion.keypoints import KeypointClip
 
@@ -32,28 +33,19 @@ MENDED = ("up", "turned", "swapped", "ground")
 
 @dataclass(frozen=True)
 class Dataset:
-    """One source of motion.
+    """One source of motion."""
 
-    Attributes:
-        source: its name, such as ``dog``: lower-case letters and digits.
-        folder: name of its folder inside the data folder.
-        licence: licence of its files and of everything derived from them.
-        attribution: authors to name.
-        read: reads one file, given its path, the first and end frame of interest and
-            the rate, each None if unknown. It may return more frames. Raises InputError
-            for another format.
-        body: bounds that recordings must satisfy.
-        config: YAML file of its retargeting configuration, see
-            :mod:`loco_drake.retargeting.source_config`; if None,
-            ``loco_drake/retargeting/sources/SOURCE.yaml`` or the defaults.
-    """
-
-    source: str
-    folder: str
-    licence: str
-    attribution: str
+    source: str  # its name, such as dog: lower-case letters and digits
+    folder: str  # name of its folder inside the data folder
+    licence: str  # licence of its files and of everything derived from them
+    attribution: str  # authors to name
+    # Reads one file, given its path, the first and end frame of interest and the rate,
+    # each None if unknown. It may return more frames. Raises InputError for another
+    # format.
     read: Callable[[Path, int | None, int | None, float | None], Recording]
-    body: Body = field(default_factory=Body)
+    body: Body = field(default_factory=Body)  # bounds that recordings must satisfy
+    # YAML file of its retargeting configuration, see retargeting.scaling; if None,
+    # loco_drake/retargeting/sources/SOURCE.yaml or the defaults.
     config: Path | None = None
 
 
@@ -61,10 +53,7 @@ DATASETS: dict[str, Dataset] = {}
 
 
 def register_dataset(dataset: Dataset) -> None:
-    """Registers a source in this process.
-
-    To register it for all commands, name the dataset as an entry point of an installed
-    package, in the group ``loco_drake.datasets``.
+    """Registers a source in this process; an entry point registers it in all.
 
     Raises:
         InputError: if its name or folder cannot be, or is taken.
@@ -142,7 +131,6 @@ def get_dataset(source: str) -> Dataset:
 def read_clip(
     source: str,
     path: Path,
-    *,
     gait: str,
     start: int | None = None,
     end: int | None = None,
@@ -166,18 +154,17 @@ def read_clip(
             is not within it, or its motion is implausible.
     """
     dataset, path = get_dataset(source), Path(path)
-    if fps is not None:
-        check_rate(fps, "The recording")
     try:
-        recording = dataset.read(path, start, end, fps)
-        recording = measure(recording, dataset.body, path)
-        points, first, stop = _stretch(recording, start, end, path)
-    except InputError:
-        raise
+        if fps is not None:
+            check_rate(fps)
+        recording = measure(dataset.read(path, start, end, fps), dataset.body)
+        points, first, stop = _stretch(recording, start, end)
     except Exception as error:  # whatever a reader stumbles over in a damaged file
-        raise InputError(
-            f"{path} cannot be read as a recording of {source}: {type(error).__name__}."
-        ) from error
+        told = isinstance(error, InputError)
+        reason = str(error) if told else f"{type(error).__name__}."
+        if str(path) not in reason:
+            reason = f"{path} cannot be read as a recording of {source}: {reason}"
+        raise InputError(reason) from error
     for name in MENDED:
         if name in recording.notes:
             _warn(f"{path.name}: {name}: {recording.notes[name]}")
@@ -199,16 +186,28 @@ def read_clip(
 
 
 def _stretch(
-    recording: Recording, start: int | None, end: int | None, path: Path
+    recording: Recording, start: int | None, end: int | None
 ) -> tuple[Array, int, int]:
-    """Returns a stretch that starts along +x, its first frame and its end frame."""
+    """Returns points of a stretch, the number of its first frame, and that after it.
+
+    They are turned and shifted so that the first frame's horizontal direction from hip
+    to withers becomes +x, and the point under the middle between them the origin.
+    """
     total = recording.first + len(recording.points)
     if start is None:
         start = recording.first if recording.start is None else recording.start
-    first, stop = check_range(start, end, total, path.name)
-    part = recording.points[first - recording.first : stop - recording.first]
-    check_frames(part, path)
-    return start_along_x(part), first, stop
+    first, stop = check_range(start, end, total)
+    points = recording.points[first - recording.first : stop - recording.first]
+    check_frames(points)
+    withers, hip = points[0, 0], points[0, 1]
+    x, y, _ = withers - hip
+    length = np.hypot(x, y)
+    if length < 1e-6:
+        raise InputError("it starts with the withers right above the hip: no heading.")
+    c, s = x / length, y / length
+    R = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    origin = (withers + hip) / 2 * np.array([1.0, 1.0, 0.0])
+    return (points - origin) @ R.T, first, stop
 
 
 @cache
@@ -223,8 +222,7 @@ def data_target(path: Path | None = None) -> Path:
     It is ``path`` if given, else the variable ``LOCO_DRAKE_DATA``, else ``data`` in the
     user's cache folder.
     """
-    given = path or os.environ.get(DATA_VARIABLE)
-    return Path(given) if given else cache_dir() / "data"
+    return Path(path or os.environ.get(DATA_VARIABLE) or cache_dir() / "data")
 
 
 def data_dir(path: Path | None = None) -> Path:

@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from loco_drake.common.errors import InputError, check_choice
-from loco_drake.common.files import atomic_path
+from loco_drake.common.files import atomic_path, is_inside, read_text
 from loco_drake.datasets.recording import check_rate
 from loco_drake.datasets.registry import DATASETS, read_clip
-from loco_drake.datasets.text import is_inside, read_text
 from loco_drake.motion.gaits import LABELS, GaitLabel
 from loco_drake.motion.keypoints import KeypointClip
 
@@ -29,30 +28,22 @@ _HORSE = re.compile(r"(Horse\d+)_M\d+_")
 class Segment:
     """A stretch of a recording with one gait.
 
-    Attributes:
-        source: a key of :data:`loco_drake.datasets.registry.DATASETS`.
-        path: the file.
-        gait: name of the gait; need not be one of the fifteen labels.
-        start: first frame, from 0, at the file's own rate.
-        end: frame after the last.
-        fps: frames per second of the file.
-
     Raises:
         InputError: if it cannot be a stretch.
     """
 
-    source: str
-    path: Path
-    gait: str
-    start: int
-    end: int
-    fps: float
+    source: str  # a key of registry.DATASETS
+    path: Path  # of the file
+    gait: str  # need not be one of the fifteen labels
+    start: int  # first frame, from 0, at the file's own rate
+    end: int  # frame after the last
+    fps: float  # of the file
 
     def __post_init__(self) -> None:
         GaitLabel(self.source, self.gait)  # checks the names
         if not 0 <= self.start < self.end:
             raise InputError(f"Frames {self.start} to {self.end} are no stretch.")
-        check_rate(self.fps, "The stretch")
+        check_rate(self.fps)
 
     @property
     def name(self) -> str:
@@ -96,12 +87,7 @@ class Segment:
             InputError: if the file does not hold them.
         """
         clip = read_clip(
-            self.source,
-            self.path,
-            gait=self.gait,
-            start=self.start,
-            end=self.end,
-            fps=self.fps,
+            self.source, self.path, self.gait, self.start, self.end, self.fps
         )
         origin = {"recording": self.recording, "recording_fps": f"{clip.fps:g}"}
         if self.animal is not None:
@@ -121,7 +107,7 @@ def read_rows(table: Path) -> list[Row]:
 
 def _numbered_rows(table: Path) -> Iterator[tuple[int, Row]]:
     """Yields number of the line and cells of each row that is not blank."""
-    text = read_text(table, "a CSV table")
+    text = read_text(table)
     header = text.partition("\n")[0]
     reader = csv.DictReader(
         io.StringIO(text, newline=""), delimiter=";" if "," not in header else ","
@@ -252,16 +238,13 @@ def one_format(segments: Iterable[Segment]) -> list[Segment]:
     others, contain the same strides.
     """
     segments = list(segments)
-    measured = {(s.source, s.recording) for s in segments if _is_measured(s)}
+    measured = [s for s in segments if s.path.suffix == ".csv"]
+    recordings = {(s.source, s.recording) for s in measured}
     return [
-        segment
-        for segment in segments
-        if _is_measured(segment) or (segment.source, segment.recording) not in measured
+        s
+        for s in segments
+        if s in measured or (s.source, s.recording) not in recordings
     ]
-
-
-def _is_measured(segment: Segment) -> bool:
-    return segment.path.suffix == ".csv"
 
 
 def select_labels(segments: Iterable[Segment], labels: Iterable[str]) -> list[Segment]:
@@ -294,11 +277,7 @@ def select_segments(
         raise InputError(f"segments.csv has no stretch of {name}.")
     available = list(dict.fromkeys(segment.gait for segment in of_source))
     for gait in wanted:
-        if gait not in available:
-            raise InputError(
-                f"segments.csv has no {gait!r} of {name}; the choices are "
-                f"{', '.join(available)}."
-            )
+        check_choice(f"gait of {name}", gait, available)
     if wanted:
         return [s for s in of_source if s.gait in wanted]
     labels = {str(label) for label in LABELS}

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from loco_drake.common.errors import InputError
-from loco_drake.datasets.recording import Array
-from loco_drake.datasets.text import read_table
+from loco_drake.datasets.recording import Array, read_table
 
 # Rounding of the text and slack of the simulated joints, m.
 RIGID_WITHIN = 0.005
@@ -18,7 +17,6 @@ RIGID_WITHIN = 0.005
 
 def read_robot(
     path: Path,
-    what: str,
     half_size: tuple[float, float],
     centre: int,
     hips: int,
@@ -32,7 +30,6 @@ def read_robot(
 
     Args:
         path: the file.
-        what: its format, for messages: "an mpc keypoint file".
         half_size: x and y in m of the front left hip in the trunk's frame.
         centre: which of the nine points the trunk's centre is.
         hips: the first of the hips FL, FR, RL, RR.
@@ -41,7 +38,7 @@ def read_robot(
     Raises:
         InputError: if the file has another form, or other hips than such a trunk.
     """
-    points = read_table(path, 27, what).reshape(-1, 9, 3)
+    points = read_table(path, 27).reshape(-1, 9, 3)
     p_hips = points[:, hips : hips + 4]
     x, y = half_size
     expected = np.array([[x, y], [x, -y], [-x, y], [-x, -y]])
@@ -57,9 +54,10 @@ def read_robot(
         (np.abs(lengths - 1) * half_size).max(axis=-1),
     )
     if (off > RIGID_WITHIN).any():
+        line = int(np.argmax(off > RIGID_WITHIN)) + 1
         raise InputError(
-            f"{path} is not {what}: in line {int(np.argmax(off > RIGID_WITHIN)) + 1} "
-            f"its hips do not lie {x} m ahead and behind, and {y} m beside, the middle "
-            "of a trunk (are these columns of another format, or not metres?)."
+            f"in line {line} its hips do not lie {x} m ahead and behind, and {y} m "
+            "beside, the middle of a trunk (are these columns of another format, or "
+            "not metres?)."
         )
     return np.stack((front, rear, *np.moveaxis(points[:, feet : feet + 4], 1, 0)), 1)

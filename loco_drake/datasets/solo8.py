@@ -15,7 +15,6 @@ from loco_drake.datasets.conventions import ground_height, orient
 from loco_drake.datasets.recording import Array, Body, Recording
 from loco_drake.datasets.simulated import read_robot
 
-FORMAT = "a solo8 keypoint file"
 FPS = 50.0
 # Of the front left hip in the trunk's frame, m.
 HALF_SIZE = (0.19, 0.104)
@@ -38,15 +37,15 @@ def read_solo8(
     Raises:
         InputError: if the file is not of this format, or ``start`` in the drop.
     """
-    points = read_robot(path, FORMAT, HALF_SIZE, centre=0, hips=1, feet=5)
+    points = read_robot(path, HALF_SIZE, centre=0, hips=1, feet=5)
     notes: dict[str, str] = {}
-    points = orient(points, BODY, path, notes)
+    points = orient(points, BODY, notes)
     points[:, 2:, 2] -= FOOT_RADIUS
     landing = _landing(points[:, 2:, 2].min(axis=1) - ground_height(points))
     if start is not None and start < landing:
         raise InputError(
-            f"{path}: the robot drops to the ground until frame {landing}; start there "
-            f"or later, best at frame {SETTLED}."
+            f"the robot drops to the ground until frame {landing}; start there or "
+            f"later, best at frame {SETTLED}."
         )
     settled = min(SETTLED, len(points) - 1) if landing > 0 else None
     return Recording(points, fps or FPS, start=settled, notes=notes)

@@ -6,13 +6,11 @@ trunk's own path in a file may be in the treadmill's frame or an estimate of the
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_smoothing_spline
 from scipy.ndimage import binary_erosion
 
 from loco_drake.common.errors import InputError
-
-Array = NDArray[np.float64]
+from loco_drake.datasets.recording import Array
 
 # Candidates for stance are markers this near to their lowest heights, m.
 LOW = 0.02
@@ -41,25 +39,17 @@ def trunk_path(trunk: Array, hooves: Array, fps: float) -> Array:
         InputError: if no hoof ever stands.
     """
     relative = (hooves - trunk[:, None])[..., :2]
-    velocity = trunk_velocity(relative, hooves[..., 2], fps)
+    velocity = _trunk_velocity(relative, hooves[..., 2], fps)
     steps = (velocity[1:] + velocity[:-1]) / (2 * fps)
     path: Array = np.concatenate((np.zeros((1, 2)), np.cumsum(steps, axis=0)))
     return path
 
 
-def trunk_velocity(relative: Array, heights: Array, fps: float) -> Array:
+def _trunk_velocity(relative: Array, heights: Array, fps: float) -> Array:
     """Returns the trunk's horizontal velocity over the belt in m/s, shape (T, 2).
 
     It is the negated mean relative velocity of the hooves in stance, interpolated
     through flight phases, in which nothing propels the trunk, and smoothed.
-
-    Args:
-        relative: horizontal positions of the hooves to the trunk, shape (T, 4, 2).
-        heights: of the hooves in m, shape (T, 4).
-        fps: frames per second.
-
-    Raises:
-        InputError: if no hoof ever stands.
     """
     time = np.arange(len(relative)) / fps
     hoof_velocity = np.gradient(relative, 1 / fps, axis=0)

@@ -14,7 +14,7 @@ from loco_drake.models.robots import Robot, get_robot
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import FPS, Motion
 from loco_drake.motion.motion_file import load_motion
-from loco_drake.retargeting.batch import SegmentRetargeter
+from loco_drake.retargeting.retarget import SegmentRetargeter
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,8 +43,7 @@ from loco_drake.motion.gait_timing import (
 )
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.quality import stance_slip_speeds, toe_trajectories
-from loco_drake.retargeting.batch import SegmentRetargeter
-from loco_drake.retargeting.retarget import RetargetReport
+from loco_drake.retargeting.retarget import RetargetReport, SegmentRetargeter
 from loco_drake.retargeting.scaling import AS_RECORDED, Variant
 
 Array = NDArray[np.float64]

@@ -38,7 +38,7 @@ from loco_drake.evaluation.tracking import (
 )
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import any_label
-from loco_drake.retargeting.batch import SegmentRetargeter
+from loco_drake.retargeting.retarget import SegmentRetargeter
 from loco_drake.systems.scenario import PlanReference, Scenario
 from loco_drake.tracking.randomization import RandomizationConfig
 

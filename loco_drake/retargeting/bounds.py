@@ -15,26 +15,17 @@ from loco_drake.models.quadruped import Quadruped
 
 @dataclass(frozen=True)
 class Bound:
-    """The range of one figure of a :class:`.retarget.RetargetReport`.
+    """The range of one figure of a :class:`.retarget.RetargetReport`."""
 
-    Attributes:
-        name: name of the figure in messages.
-        low: smallest value.
-        high: largest value; with ``stances``, over the robot's stance height.
-        unit: unit in messages.
-        factor: from the figure to that unit.
-        planar_high: largest value for robots with fewer than three joints per leg,
-            whose toes follow each lateral sway of the trunk.
-        stances: whether lengths are relative to the robot's stance height.
-    """
-
-    name: str
-    low: float
-    high: float
-    unit: str = ""
-    factor: float = 1.0
+    name: str  # name of the figure in messages
+    low: float  # smallest value
+    high: float  # largest value; with stances, over the robot's stance height
+    unit: str = ""  # unit in messages
+    factor: float = 1.0  # from the figure to that unit
+    # Largest value for robots with fewer than three joints per leg, whose toes follow
+    # each lateral sway of the trunk.
     planar_high: float | None = None
-    stances: bool = False
+    stances: bool = False  # whether lengths are relative to the robot's stance height
 
 
 # By key of the report. Worst of the 347 stretches: see the comments.

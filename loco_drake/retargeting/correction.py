@@ -28,8 +28,7 @@ from loco_drake.common.rotations import quat_rotate
 from loco_drake.common.runs import intervals
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion.motion import FPS
-from loco_drake.retargeting.scaling import Targets
-from loco_drake.retargeting.source_config import RetargetConfig
+from loco_drake.retargeting.scaling import RetargetConfig, Targets
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -120,14 +119,14 @@ def smooth(values: Array, cutoff: float, fps: float) -> Array:
     frames = len(values)
     D = difference_matrix(frames)
     system = eye_array(frames, format="csc") + penalty(cutoff, fps) * (D.T @ D)
-    smoothed: Array = splu(csc_matrix(system)).solve(values.reshape(frames, -1))
-    return smoothed.reshape(values.shape)
+    smoothed = splu(csc_matrix(system)).solve(values.reshape(frames, -1))
+    return np.reshape(smoothed, values.shape)
 
 
 def plant_feet(
     p_WF: Array, contacts: Bools, foot_radius: float, cutoff: float, fps: float
 ) -> Array:
-    """Returns toe trajectories that stand still in contact and swing above the ground.
+    """Returns toes (T, 4, 3) that stand still in contact and swing above the ground.
 
     Args:
         p_WF: the formula's targets in m, shape (T, 4, 3).
@@ -135,9 +134,6 @@ def plant_feet(
         foot_radius: of the toe sphere in m.
         cutoff: of the smoothing, Hz.
         fps: frames per second.
-
-    Returns:
-        Toe positions in m, shape (T, 4, 3).
     """
     weight = penalty(cutoff, fps)
     D = difference_matrix(len(p_WF))
@@ -170,19 +166,13 @@ def swing_clearance(contact: Bools, fps: float) -> Array:
 
 def _fit_ground_plane(target: Array, contact: Bools, smoothness: csc_matrix) -> Array:
     """Returns x, y (T, 2) nearest to ``target`` that are constant in each contact."""
-    columns = np.cumsum(_starts_new_value(contact)) - 1
     frames = len(target)
+    # A value differs from that of the frame before, but within a contact.
+    columns = np.r_[0, np.cumsum(~(contact[1:] & contact[:-1]))]
     M = csr_matrix((np.ones(frames), (np.arange(frames), columns)))
     values = spsolve(csc_matrix(M.T @ smoothness @ M), M.T @ target)
     fitted: Array = M @ values.reshape(-1, 2)
     return fitted
-
-
-def _starts_new_value(contact: Bools) -> Bools:
-    """Returns where a value may differ from the frame before."""
-    new = np.ones(len(contact), dtype=bool)
-    new[1:] = ~(contact[1:] & contact[:-1])
-    return new
 
 
 def _fit_height(

@@ -10,35 +10,26 @@ from loco_drake.common.runs import intervals
 from loco_drake.models.legs import LEGS
 from loco_drake.motion.gait_timing import clip_track, gait_timing
 from loco_drake.motion.keypoints import KeypointClip
-from loco_drake.retargeting.contacts import detect_contacts
-from loco_drake.retargeting.scaling import stance_height
-from loco_drake.retargeting.source_config import load_config
+from loco_drake.retargeting.contacts import detect_contacts, stance_height
+from loco_drake.retargeting.scaling import load_config
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class ClipSummary:
-    """Figures of a clip; see :mod:`loco_drake.motion.gait_timing`.
+    """Figures of a clip; see :mod:`loco_drake.motion.gait_timing`."""
 
-    Attributes:
-        frames: of the clip.
-        fps: its rate.
-        seconds: from the first frame to the last.
-        stance_height_m: of the middle between withers and hip.
-        speed_mean_mps: of that point over the ground.
-        stride_period_s: None, as all that follows, if there are not three strides.
-        duty_factor: share of the stride that each foot is down, FL, FR, RL, RR.
-        phase: lag of each foot behind RL as a share of the stride.
-    """
-
-    frames: int
-    fps: float
-    seconds: float
-    stance_height_m: float
-    speed_mean_mps: float
+    frames: int  # of the clip
+    fps: float  # its rate
+    seconds: float  # from the first frame to the last
+    stance_height_m: float  # of the middle between withers and hip
+    speed_mean_mps: float  # of that point over the ground
+    # None, as all that follows, if there are not three strides.
     stride_period_s: float | None
+    # Share of the stride that each foot is down, FL, FR, RL, RR.
     duty_factor: tuple[float, ...] | None
+    # Lag of each foot behind RL as a share of the stride.
     phase: tuple[float, ...] | None
 
 

@@ -21,15 +21,10 @@ _REST = 1e-3
 
 
 class Solution(NamedTuple):
-    """Joints of T frames.
+    """Joints of T frames."""
 
-    Attributes:
-        joints: rad, shape (T, J).
-        solved: in which frames the solver succeeded, shape (T,).
-    """
-
-    joints: Array
-    solved: NDArray[np.bool_]
+    joints: Array  # rad, shape (T, J)
+    solved: NDArray[np.bool_]  # in which frames the solver succeeded, shape (T,)
 
 
 class LegSolver:

@@ -1,81 +1,80 @@
-"""Retargeting of one recording of an animal to one Motion of a robot."""
+"""Retargeting of recordings to motions of a robot: one, or many in worker processes."""
 
 import time
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
+from loco_drake.common.errors import InputError
+from loco_drake.common.parallel import map_in_workers
+from loco_drake.datasets.segments import Segment
+from loco_drake.datasets.split import Split
 from loco_drake.models.quadruped import Quadruped
+from loco_drake.models.robot_files import load_robot
 from loco_drake.motion import quality
 from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.motion.motion import FPS, Motion, make_motion
+from loco_drake.motion.motion_file import save_motion
 from loco_drake.retargeting.bounds import outside_bounds
-from loco_drake.retargeting.contacts import detect_contacts, resample_contacts
+from loco_drake.retargeting.contacts import (
+    detect_contacts,
+    frames_on_feet,
+    on_feet,
+    resample_contacts,
+    stance_height,
+    track_width,
+)
 from loco_drake.retargeting.correction import correct
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.scaling import (
     AS_RECORDED,
+    RetargetConfig,
     Variant,
-    frames_on_feet,
     in_time,
-    on_feet,
+    load_config,
     resample,
     scale_to_robot,
     smoothing_in_time,
-    stance_height,
-    track_width,
 )
-from loco_drake.retargeting.source_config import RetargetConfig, load_config
+from loco_drake.retargeting.trajectories import Stretch
 
 
 @dataclass(frozen=True)
 class RetargetReport:
-    """Quality of one retargeted clip, see :mod:`loco_drake.motion.quality`.
+    """Quality of one retargeted clip, see :mod:`loco_drake.motion.quality`."""
 
-    Attributes:
-        frames: of the motion.
-        frames_per_second: frames of the motion per second of computing.
-        toe_error_rmse_m: of the toes against the targets that the solver was given.
-        correction_rmse_m: of those targets against the paper's formula.
-        trunk_correction_rmse_m: of the trunk's position against the paper's formula.
-        stance_slip_median_mps: None if no toe ever stands.
-        penetration_max_m: deepest.
-        joint_limit_violations: number of joint angles.
-        joint_speed_ratio_max: highest speed over its limit.
-        scale: the robot's stance height over the animal's.
-        time_scale: how long the motion lasts, over the recording.
-        mirrored: whether left and right are exchanged.
-        on_feet_share: share of the recording's frames in which the animal is on its
-            feet; None where the source's configuration says how high it stands.
-        on_feet_frames: those frames, in the recording's numbers, such as "240-420".
-        trunk_height_ratio: median height of the recording's trunk over the stance
-            height that the scale is of.
-        toes_in_place_share: share of the frames in which a toe is on its own side of
-            the trunk, and a front toe ahead of the rear one, of the worst toe.
-        source_track_m: how far left of the right toes the recording's left ones are.
-        unsolved_frames: for which inverse kinematics found no solution.
-        warnings: a sentence for each figure outside its bound, see :mod:`.bounds`.
-    """
-
-    frames: int
-    frames_per_second: float
-    toe_error_rmse_m: float
-    correction_rmse_m: float
+    frames: int  # of the motion
+    frames_per_second: float  # frames of the motion per second of computing
+    toe_error_rmse_m: float  # of the toes against the targets that the solver was given
+    correction_rmse_m: float  # of those targets against the paper's formula
+    # Of the trunk's position against the paper's formula.
     trunk_correction_rmse_m: float
-    stance_slip_median_mps: float | None
-    penetration_max_m: float
-    joint_limit_violations: int
-    joint_speed_ratio_max: float
-    scale: float
-    time_scale: float
-    mirrored: bool
+    stance_slip_median_mps: float | None  # None if no toe ever stands
+    penetration_max_m: float  # deepest
+    joint_limit_violations: int  # number of joint angles
+    joint_speed_ratio_max: float  # highest speed over its limit
+    scale: float  # the robot's stance height over the animal's
+    time_scale: float  # how long the motion lasts, over the recording
+    mirrored: bool  # whether left and right are exchanged
+    # Share of the recording's frames in which the animal is on its feet; None where the
+    # source's configuration says how high it stands.
     on_feet_share: float | None
+    # Those frames, in the recording's numbers, such as "240-420".
     on_feet_frames: str | None
+    # Median height of the recording's trunk over the stance height that the scale is
+    # of.
     trunk_height_ratio: float
+    # Share of the frames in which a toe is on its own side of the trunk, and a front
+    # toe ahead of the rear one, of the worst toe.
     toes_in_place_share: float
+    # How far left of the right toes the recording's left ones are.
     source_track_m: float
-    unsolved_frames: int
+    unsolved_frames: int  # for which inverse kinematics found no solution
+    # A sentence for each figure outside its bound, see bounds.
     warnings: tuple[str, ...] = ()
 
 
@@ -154,3 +153,119 @@ def retarget_clip(
     if report.warnings:
         figures["warnings"] = "; ".join(report.warnings)
     return replace(motion, provenance={**motion.provenance, **figures}), report
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The result of retargeting one segment: a file and a report, or an error."""
+
+    segment: Segment  # the stretch of a recording
+    path: Path  # path of the Motion file, whether written or not
+    report: RetargetReport | None  # None on failure
+    error: str | None  # reason of the failure as a sentence, else None
+
+
+class SegmentRetargeter:
+    """Retargets segments one by one with one solver.
+
+    Args:
+        robot: to move.
+        split: gives the side that goes into the provenance; None leaves it out.
+        variant: what to change of the recordings.
+    """
+
+    def __init__(
+        self,
+        robot: Quadruped,
+        split: Split | None = None,
+        variant: Variant = AS_RECORDED,
+    ) -> None:
+        self.robot = robot
+        self._split = split
+        self._variant = variant
+        self._solver = LegSolver(robot, FPS)
+
+    def __call__(
+        self, segment: Segment
+    ) -> tuple[KeypointClip, Motion, RetargetReport] | str:
+        """Returns clip, motion and report, or the sentence that says what failed.
+
+        The clip is the variant, in the time of the motion, to compare the motion with.
+        """
+        try:
+            clip = segment.read()
+            if self._split is not None:
+                side = {"split": self._split.side(segment)}
+                clip = replace(clip, provenance={**clip.provenance, **side})
+            motion, report = retarget_clip(
+                clip, self.robot, solver=self._solver, variant=self._variant
+            )
+            return self._variant.apply(clip, report.scale), motion, report
+        except InputError as error:
+            return str(error)
+        except (ArithmeticError, LookupError, RuntimeError, ValueError) as error:
+            # A failure of a solver or table concerns this clip only.
+            return f"{type(error).__name__}: {error}"
+
+
+def retarget_segments(
+    segments: Iterable[Segment],
+    robot: Quadruped,
+    out_dir: Path,
+    split: Split | None = None,
+    workers: int = 1,
+    variant: Variant = AS_RECORDED,
+) -> Iterator[Outcome]:
+    """Retargets segments, and writes ``out_dir/SEGMENT.npz`` for each.
+
+    A recording that cannot be read or retargeted is reported in its outcome and does
+    not stop the others. A process has only one clip at a time in memory.
+
+    Args:
+        segments: from :func:`loco_drake.datasets.segments.read_segments`.
+        robot: to move.
+        out_dir: made if need be; files of the same name are replaced.
+        split: gives the side that goes into the provenance; None leaves it out.
+        workers: processes.
+        variant: what to change of the recordings.
+
+    Yields:
+        One outcome for each segment, in their order, as soon as it is done.
+    """
+    make = partial(_make_writer, robot.definition, Path(out_dir), split, variant)
+    return map_in_workers(make, segments, workers)
+
+
+def _make_writer(
+    robot: str, out_dir: Path, split: Split | None, variant: Variant
+) -> Callable[[Segment], Outcome]:
+    retarget = SegmentRetargeter(load_robot(robot), split, variant)
+
+    def write(segment: Segment) -> Outcome:
+        path = out_dir / f"{segment.name}.npz"
+        result = retarget(segment)
+        if isinstance(result, str):
+            return Outcome(segment, path, None, result)
+        _, motion, report = result
+        save_motion(motion, path)
+        return Outcome(segment, path, report, None)
+
+    return write
+
+
+def stretches_of(outcomes: Iterable[Outcome], split: Split) -> list[Stretch]:
+    """Returns the retargeted stretches from which trajectories can be cut."""
+    return [
+        Stretch(
+            path=outcome.path,
+            label=GaitLabel(outcome.segment.source, outcome.segment.gait),
+            recording=f"{outcome.segment.source}-{outcome.segment.recording}",
+            subject=outcome.segment.subject,
+            side=split.side(outcome.segment),
+            start=outcome.segment.start / outcome.segment.fps,
+            frames=outcome.report.frames,
+            rate=FPS * outcome.report.time_scale,
+        )
+        for outcome in outcomes
+        if outcome.report is not None
+    ]

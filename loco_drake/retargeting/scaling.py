@@ -30,8 +30,9 @@ contacts are found before the clock is changed, and cut-off frequencies change w
 The clearance of a swing and the limits of the joints are the robot's.
 """
 
-from dataclasses import dataclass, replace
-from math import sqrt
+from dataclasses import dataclass, field, replace
+from math import isfinite, sqrt
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,42 +45,115 @@ from loco_drake.common.rotations import (
     quat_rotate,
     yaw_quat,
 )
-from loco_drake.common.runs import intervals
+from loco_drake.common.typed_yaml import read_yaml
+from loco_drake.datasets.registry import get_dataset
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion.keypoints import KeypointClip
-from loco_drake.retargeting.source_config import RetargetConfig
 
 Array = NDArray[np.float64]
 
-# An animal is on its feet where the heights of withers and hip, over the distances of
-# their toes, are above UPRIGHT, the legs are longer than UNFOLDED of the longest they
-# are, and the trunk's height is above OFF_THE_GROUND of its length. In the stretches of
-# dog and horse the least are .82 (a gallop), .74 (a canter) and .95. Of a dog that sits
-# the hip is at .3; of one that lies both are at .1 to .6, and it is at .1 to .45 of its
-# length.
-UPRIGHT, UNFOLDED, OFF_THE_GROUND = 0.75, 0.65, 0.45
-# Withers and hip differ in height by less than this of the trunk's length; .26 there.
-STEEP = 0.6
-LEAST_STANDING = 0.2  # s
+_SOURCES = Path(__file__).parent / "sources"
 
-_MOST_RUNS = 5
+
+@dataclass(kw_only=True)
+class ContactConfig:
+    """Contact thresholds; see :mod:`loco_drake.retargeting.contacts`."""
+
+    # A toe lands below the first height and leaves above the second, both as fractions
+    # of the stance height.
+    land_height: float = 0.05
+    leave_height: float = 0.09
+    # ... and when it is slower, or faster, than these fractions of the trunk's speed,
+    # or than these speeds in m/s where that is more.
+    land_speed_ratio: float = 0.35
+    leave_speed_ratio: float = 0.5
+    land_speed: float = 0.4
+    leave_speed: float = 0.7
+    # Shorter contacts and shorter flights are taken for noise; s.
+    shortest_stance: float = 0.04
+    shortest_swing: float = 0.06
+
+
+@dataclass(kw_only=True)
+class SmoothingConfig:
+    """Cut-off frequencies of the zero-phase low-pass filters, in Hz."""
+
+    # Of the trunk's position, heading and pitch.
+    base: float = 5.0
+    # Of the toes.
+    toes: float = 7.0
+
+
+@dataclass(kw_only=True)
+class RetargetConfig:
+    """Parameters that map the keypoints of one source to targets of a robot."""
+
+    # The source's stance height in m, where all its clips are of one body that may
+    # creep or stand tall. Without it, it is clip by clip this percentile of the height
+    # of the middle between withers and hip.
+    stance_height: float | None = None
+    stance_height_percentile: float = 50.0
+    # Where the virtual hip joints lie, on the line from hip to withers: ahead of the
+    # withers and ahead of the hip, and to the sides of that line, as fractions of the
+    # stance height.
+    front_hip: float = 0.0
+    rear_hip: float = 0.0
+    hip_spread: float = 0.0
+    # Added to the height of the robot's trunk, m.
+    base_height_offset: float = 0.0
+    # Multiplies the height of the toes beside the scale.
+    swing_height: float = 1.0
+    contact: ContactConfig = field(default_factory=ContactConfig)
+    smoothing: SmoothingConfig = field(default_factory=SmoothingConfig)
+
+
+def load_config(source: str) -> RetargetConfig:
+    """Returns the configuration of a source: its dataset's, or the shipped one.
+
+    A dataset that has neither gets the defaults.
+
+    Raises:
+        InputError: naming the sources that there are.
+    """
+    own, shipped = get_dataset(source).config, _SOURCES / f"{source}.yaml"
+    if own is None and not shipped.is_file():
+        return RetargetConfig()
+    return read_config(own or shipped)
+
+
+def read_config(path: Path) -> RetargetConfig:
+    """Returns the configuration in a YAML file; fields not named keep their default.
+
+    Raises:
+        InputError: if the file is missing, names an unknown field, or holds a value
+            that cannot be.
+    """
+    config = read_yaml(path, RetargetConfig, "a retargeting configuration")
+    above_0 = {
+        "swing_height": config.swing_height,
+        "stance_height": 1.0 if config.stance_height is None else config.stance_height,
+        **{f"smoothing.{key}": value for key, value in vars(config.smoothing).items()},
+        **{f"contact.{key}": value for key, value in vars(config.contact).items()},
+    }
+    for name, value in above_0.items():
+        if not 0 < value < float("inf"):
+            raise InputError(f"{path}: {name} must be above 0, not {value}.")
+    for name in ("front_hip", "rear_hip", "hip_spread", "base_height_offset"):
+        if not isfinite(value := getattr(config, name)):
+            raise InputError(f"{path}: {name} must be finite, not {value}.")
+    if not 0 <= config.stance_height_percentile <= 100:
+        raise InputError(f"{path}: stance_height_percentile must be within 0 to 100.")
+    return config
 
 
 @dataclass(frozen=True)
 class Targets:
-    """Where a robot's trunk and toes are to be over T frames.
+    """Where a robot's trunk and toes are to be over T frames."""
 
-    Attributes:
-        p_WB: position of the trunk in m, shape (T, 3).
-        yaw: heading of the trunk in rad, without jumps, shape (T,).
-        pitch: of the trunk in rad, nose down above 0, shape (T,).
-        p_WF: centres of the toe spheres in m, shape (T, 4, 3).
-    """
-
-    p_WB: Array
-    yaw: Array
-    pitch: Array
-    p_WF: Array
+    p_WB: Array  # position of the trunk in m, shape (T, 3)
+    yaw: Array  # heading of the trunk in rad, without jumps, shape (T,)
+    pitch: Array  # of the trunk in rad, nose down above 0, shape (T,)
+    p_WF: Array  # centres of the toe spheres in m, shape (T, 4, 3)
 
     @property
     def q_WB(self) -> Array:
@@ -94,77 +168,6 @@ class Targets:
         """Centres of the toe spheres in the trunk frame, m, shape (T, 4, 3)."""
         q_BW = quat_conjugate(self.q_WB)[:, None]
         return quat_rotate(q_BW, self.p_WF - self.p_WB[:, None])
-
-
-def on_feet(clip: KeypointClip) -> NDArray[np.bool_]:
-    """Returns in which frames the animal stands on its feet, shape (T,).
-
-    In these, withers and hip are about as high as they are far from their toes, the
-    legs are not folded, and the trunk is neither on the ground nor steep. A sitting
-    animal has a low hip; a lying one has its legs folded or to the side.
-    """
-    front = np.linalg.norm(clip.toes[:, :2] - clip.withers[:, None], axis=-1).mean(1)
-    rear = np.linalg.norm(clip.toes[:, 2:] - clip.hip[:, None], axis=-1).mean(1)
-    height = (clip.withers[:, 2] + clip.hip[:, 2]) / 2
-    trunk = np.median(np.linalg.norm(clip.withers - clip.hip, axis=-1))
-    upright = (
-        (clip.withers[:, 2] > UPRIGHT * front)
-        & (clip.hip[:, 2] > UPRIGHT * rear)
-        & (height > OFF_THE_GROUND * trunk)
-        & (np.abs(clip.withers[:, 2] - clip.hip[:, 2]) < STEEP * trunk)
-    )
-    legs = front + rear
-    longest = legs[upright].max(initial=0.0)
-    return upright & (legs > UNFOLDED * longest)
-
-
-def track_width(clip: KeypointClip) -> float:
-    """Returns the mean lateral distance of the left toes from the right ones, m."""
-    ahead = (clip.withers - clip.hip)[:, :2]
-    left = np.stack((-ahead[:, 1], ahead[:, 0]), axis=-1)
-    left = left / np.maximum(np.linalg.norm(left, axis=-1, keepdims=True), 1e-9)
-    apart = (clip.toes[:, 0::2] - clip.toes[:, 1::2])[..., :2].mean(axis=1)
-    return float((apart * left).sum(axis=-1).mean())
-
-
-def frames_on_feet(clip: KeypointClip, standing: NDArray[np.bool_]) -> str:
-    """Returns these frames as numbers of the recording, such as "240-420"."""
-    first = int(clip.provenance.get("frames", "0").split("-")[0])
-    runs = [f"{first + start}-{first + end}" for start, end in intervals(standing)]
-    if len(runs) > _MOST_RUNS:
-        runs = [*runs[:_MOST_RUNS], f"{len(runs) - _MOST_RUNS} more"]
-    return ", ".join(runs)
-
-
-def stance_height(clip: KeypointClip, config: RetargetConfig) -> float:
-    """Returns the animal's stance height in m: of the middle of withers and hip.
-
-    It is that of the configuration, or else a percentile over the frames in which the
-    animal is on its feet.
-
-    Raises:
-        InputError: if the middle lies below the ground, or the animal is on its feet in
-            too few frames to tell its size, naming these.
-    """
-    middle = (clip.withers[:, 2] + clip.hip[:, 2]) / 2
-    lowest = float(np.percentile(middle, config.stance_height_percentile))
-    if lowest <= 0:
-        raise InputError(
-            f"The middle of withers and hip lies {lowest:.3g} m over the ground, "
-            "so this is no clip of an animal on its feet."
-        )
-    if config.stance_height is not None:
-        return config.stance_height
-    standing = on_feet(clip)
-    if not standing.all() and standing.sum() < LEAST_STANDING * clip.fps:
-        where = frames_on_feet(clip, standing)
-        raise InputError(
-            "The animal is on its feet in "
-            + (f"no frames but {where}" if where else "no frame")
-            + ", too few to tell how high it stands: its withers and hip must be over "
-            "its toes for its size to be known."
-        )
-    return float(np.percentile(middle[standing], config.stance_height_percentile))
 
 
 def resample(clip: KeypointClip, fps: float) -> KeypointClip:
@@ -220,15 +223,10 @@ def scale_to_robot(
 
 @dataclass(frozen=True)
 class Variant:
-    """Changes to a recording; none by default.
+    """Changes to a recording; none by default."""
 
-    Attributes:
-        mirror: whether left and right are exchanged.
-        froude: whether time is scaled for the animal's Froude number.
-    """
-
-    mirror: bool = False
-    froude: bool = False
+    mirror: bool = False  # whether left and right are exchanged
+    froude: bool = False  # whether time is scaled for the animal's Froude number
 
     @property
     def suffix(self) -> str:

@@ -54,27 +54,16 @@ def cut(motion: Motion, start: int, size: int) -> Motion:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A retargeted stretch of a recording, as needed for cutting trajectories.
+    """A retargeted stretch of a recording, as needed for cutting trajectories."""
 
-    Attributes:
-        path: of its Motion file.
-        label: what it holds.
-        recording: which no two trajectories may share a moment of.
-        subject: the animal, or else the recording.
-        side: of the split.
-        start: when it starts in the recording, s.
-        frames: of its motion.
-        rate: frames of its motion for each second of the recording.
-    """
-
-    path: Path
-    label: GaitLabel
-    recording: str
-    subject: str
-    side: str
-    start: float
-    frames: int
-    rate: float = FPS
+    path: Path  # of its Motion file
+    label: GaitLabel  # what it holds
+    recording: str  # which no two trajectories may share a moment of
+    subject: str  # the animal, or else the recording
+    side: str  # of the split
+    start: float  # when it starts in the recording, s
+    frames: int  # of its motion
+    rate: float = FPS  # frames of its motion for each second of the recording
 
 
 @dataclass(frozen=True)
@@ -165,13 +154,9 @@ def _packed(start: int, end: int, size: int, count: int) -> list[int]:
 def _offers(
     stretches: Sequence[Stretch], size: int, most: int, taken: Sequence[Window]
 ) -> list[Window]:
-    """Returns windows that overlap neither each other nor ``taken``.
+    """Returns windows of ``size`` frames that overlap neither each other nor ``taken``.
 
-    Args:
-        stretches: of one label.
-        size: frames of a window.
-        most: windows of a stretch, side by side in the largest part of it that is free.
-        taken: windows of other labels.
+    A stretch offers up to ``most``, side by side in the largest part that is free.
     """
     offers: list[Window] = []
     for stretch in sorted(stretches, key=lambda s: (-s.frames, s.path)):

@@ -55,7 +55,8 @@ def test_inspect_of_fewer_than_four_frames_is_refused(frames, tmp_path, capsys):
     out = ("--out", str(tmp_path / "a.png"))
     assert main(["data", "inspect", str(tmp_path / "a.txt"), *out]) == 2
     assert capsys.readouterr().err.endswith(
-        f"a.txt: a recording needs at least 4 frames, not {frames}.\n"
+        "a.txt cannot be read as a recording of dog: it needs at least 4 frames, not "
+        f"{frames}.\n"
     )
     assert not (tmp_path / "a.png").exists()
 

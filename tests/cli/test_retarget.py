@@ -105,9 +105,9 @@ def test_help_explains_the_options(capsys):
         command("--help")
     page = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert "--mirror" in page
-    assert "Exchanges left and right" in page
+    assert "Exchange left and right" in page
     assert "--froude" in page
-    assert "Scales time for the animal's Froude number" in page
+    assert "Scale time to keep the animal's Froude number" in page
 
 
 def test_robot_that_is_only_a_file(made_data, tmp_path, monkeypatch, capsys):
@@ -162,7 +162,8 @@ def test_bad_clip_in_a_batch_is_reported_with_status_1(made_data, tmp_path, caps
     options = ("--data-dir", tmp_path, "--gait", "pace", "--out", tmp_path / "out")
     assert command(*options, "--json", tmp_path / "a.json").run() == 1
     message = capsys.readouterr().err
-    assert "Failed: dog-pace-made_pace-0-9999: Frames 0 to 9999" in message
+    assert "Failed: dog-pace-made_pace-0-9999: " in message
+    assert "recording of dog: frames 0 to 9999" in message
     figures = json.loads((tmp_path / "a.json").read_text())
     assert "error" in figures["dog-pace-made_pace-0-9999"]
     assert (tmp_path / "out" / "dog-pace-made_pace-0-240.npz").is_file()
@@ -173,7 +174,7 @@ def test_wrong_input_raises_one_sentence(made_data, tmp_path):
     file = made_data / "dog_mann" / "keypoints" / "made_trot.txt"
     wrong = {
         ("--robot", "spot", *data): "'spot'; the choices are go2, a1",
-        ("--gait", "fly", *data): "'fly' of any source; the choices are pace",
+        ("--gait", "fly", *data): "gait of any source 'fly'; the choices are pace",
         ("--workers", "0", *data): "--workers must be 1 or more",
         ("--trajectories", "-1", *data): "--trajectories must be 0 or more",
         ("--start", "3", *data): "need a FILE",
@@ -263,7 +264,7 @@ def test_folder_without_one_of_the_fifteen_gaits_says_what_is_there(tmp_path):
 def test_file_of_another_source_leaves_nothing_behind(tmp_path):
     file = write_recording("mpc", tmp_path)
     options = ("--source", "solo8", "--gait", "trot", "--out", tmp_path / "out")
-    with pytest.raises(InputError, match="is not a solo8 keypoint file"):
+    with pytest.raises(InputError, match="cannot be read as a recording of solo8"):
         command(file, *options).run()
     assert not (tmp_path / "out").exists()
 

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from loco_drake.common.errors import InputError
-from loco_drake.datasets.bvh import read_bvh
+from loco_drake.datasets.bvh import parse_bvh
+from loco_drake.datasets.recording import read_lines
 from loco_drake.datasets.registry import read_clip
 from tests.synthetic_bvh import write_dog_bvh
 
@@ -50,7 +51,7 @@ def arm(tmp_path, order="Zrotation Xrotation Yrotation", angles="0 0 0 0"):
     ],
 )
 def test_forward_kinematics_by_hand(tmp_path, order, angles, elbow, end):
-    bvh = read_bvh(arm(tmp_path, order, angles), "a BVH file")
+    bvh = parse_bvh(read_lines(arm(tmp_path, order, angles)))
     assert bvh.fps == 100.0
     assert [joint.name for joint in bvh.joints] == ["Base", "Elbow", "End Site"]
     expected = [[(10, 20, 30), elbow, end]]
@@ -78,7 +79,7 @@ def test_damaged_file_is_refused_with_the_reason(tmp_path, old, new, reason):
     path = arm(tmp_path)
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(InputError, match=reason):
-        read_bvh(path, "a BVH file")
+        parse_bvh(read_lines(path))
 
 
 @pytest.mark.parametrize("name", ["dog.bvh", "dog.txt"])

@@ -258,10 +258,10 @@ def _robot(folder: Path) -> None:
 
 
 def _sources(folder: Path) -> None:
-    from loco_drake.retargeting import source_config
+    from loco_drake.retargeting import scaling
 
     _recording("dog")(folder)
-    shutil.copytree(Path(source_config.__file__).parent / "sources", folder / "sources")
+    shutil.copytree(Path(scaling.__file__).parent / "sources", folder / "sources")
 
 
 def _result(name: str) -> Callable[[Path], None]:
@@ -464,7 +464,7 @@ def _kinds() -> Iterator[Kind]:
         retarget,
         _sources,
         _of(text.yaml_texts),
-        patches={"loco_drake.retargeting.source_config._FOLDER": "sources"},
+        patches={"loco_drake.retargeting.scaling._SOURCES": "sources"},
         named=False,
         values=True,
     )

@@ -20,7 +20,7 @@ from loco_drake.models.plant import (
     PlantConfig,
 )
 from loco_drake.models.robots import ROBOTS, AddRobotModel, get_robot
-from loco_drake.models.trot import AddTrotSource
+from tests.models.trot import AddTrotSource
 
 
 def build(name, config, q_d):

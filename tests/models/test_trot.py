@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from loco_drake.models.robots import ROBOTS, get_robot
-from loco_drake.models.trot import trot_joints
+from tests.models.trot import trot_joints
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -4,7 +4,7 @@ from loco_drake.datasets.segments import read_segments
 from loco_drake.datasets.split import Split
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import load_motion
-from loco_drake.retargeting.batch import retarget_segments
+from loco_drake.retargeting.retarget import retarget_segments
 
 
 def test_one_bad_clip_does_not_stop_the_others(made_data, tmp_path):

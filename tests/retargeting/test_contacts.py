@@ -7,7 +7,7 @@ from loco_drake.retargeting.contacts import (
     detect_contacts,
     resample_contacts,
 )
-from loco_drake.retargeting.source_config import ContactConfig, load_config
+from loco_drake.retargeting.scaling import ContactConfig, load_config
 from tests.synthetic import FPS, STANCE_HEIGHT, make_dog
 
 

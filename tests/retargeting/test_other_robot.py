@@ -17,8 +17,7 @@ from loco_drake.motion.motion import FPS
 from loco_drake.motion.quality import stance_slip_median
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import retarget_clip
-from loco_drake.retargeting.scaling import Variant
-from loco_drake.retargeting.source_config import load_config
+from loco_drake.retargeting.scaling import Variant, load_config
 from tests.robot_files import FOREIGN, SOLO8, write_robot
 from tests.synthetic import GAITS, STANCE_HEIGHT, make_dog
 

@@ -13,8 +13,7 @@ from loco_drake.motion.motion import FPS
 from loco_drake.retargeting.correction import within_reach
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import retarget_clip
-from loco_drake.retargeting.scaling import Targets
-from loco_drake.retargeting.source_config import load_config
+from loco_drake.retargeting.scaling import Targets, load_config
 from tests.synthetic import GAITS, STANCE_HEIGHT, make_dog, write_dog_recording
 
 

@@ -9,14 +9,8 @@ from loco_drake.datasets.registry import read_clip
 from loco_drake.datasets.segments import read_segments
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.keypoints import KeypointClip
-from loco_drake.retargeting.scaling import (
-    frames_on_feet,
-    on_feet,
-    resample,
-    scale_to_robot,
-    stance_height,
-)
-from loco_drake.retargeting.source_config import RetargetConfig
+from loco_drake.retargeting.contacts import frames_on_feet, on_feet, stance_height
+from loco_drake.retargeting.scaling import RetargetConfig, resample, scale_to_robot
 from tests.synthetic import make_dog
 
 

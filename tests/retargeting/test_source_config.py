@@ -1,7 +1,7 @@
 import pytest
 
 from loco_drake.common.errors import InputError
-from loco_drake.retargeting.source_config import ContactConfig, load_config, read_config
+from loco_drake.retargeting.scaling import ContactConfig, load_config, read_config
 
 
 def test_shipped_dog_says_where_its_hips_are():
@@ -35,6 +35,7 @@ def test_fields_not_named_keep_their_default(tmp_path):
         ("smoothing: {toes: 0}\n", "smoothing.toes must be above 0"),
         ("contact: {land_speed: .nan}\n", "contact.land_speed must be above 0"),
         ("stance_height_percentile: 101\n", "within 0 to 100"),
+        ("rear_hip: 0.1\nrear_hip: 0.2\n", "line 2 names 'rear_hip' a second time"),
     ],
 )
 def test_wrong_configuration_is_refused_with_the_reason(tmp_path, text, reason):

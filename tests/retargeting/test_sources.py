@@ -8,11 +8,10 @@ from loco_drake.datasets.registry import read_clip
 from loco_drake.datasets.segments import read_segments
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import FPS
-from loco_drake.retargeting.contacts import detect_contacts
+from loco_drake.retargeting.contacts import detect_contacts, stance_height
 from loco_drake.retargeting.inspection import summarize
 from loco_drake.retargeting.retarget import retarget_clip
-from loco_drake.retargeting.scaling import stance_height
-from loco_drake.retargeting.source_config import load_config
+from loco_drake.retargeting.scaling import load_config
 from tests.retargeting.test_retarget import assert_good
 from tests.synthetic_horse import GAITS, make_horse, write_world_recording
 from tests.synthetic_robots import (

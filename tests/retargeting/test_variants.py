@@ -14,8 +14,13 @@ from loco_drake.motion.motion import FPS
 from loco_drake.retargeting.contacts import detect_contacts
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import retarget_clip
-from loco_drake.retargeting.scaling import Variant, in_time, smoothing_in_time
-from loco_drake.retargeting.source_config import RetargetConfig, load_config
+from loco_drake.retargeting.scaling import (
+    RetargetConfig,
+    Variant,
+    in_time,
+    load_config,
+    smoothing_in_time,
+)
 from tests.synthetic import GAITS, STANCE_HEIGHT, make_dog
 from tests.synthetic_horse import make_horse
 from tests.synthetic_robots import MPC_GAITS, SOLO8_GAIT, make_robot

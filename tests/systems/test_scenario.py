@@ -44,6 +44,7 @@ def test_a_scenario_is_read_from_yaml(tmp_path):
 
 BAD = {
     "robto: go2": "cannot be read",
+    "robot: go2\nrobot: a1": "line 2 names 'robot' a second time",
     "robot: spot": "Unknown robot 'spot'; the choices are go2, a1",
     "robot: [go2]": "cannot be read",
     "plant: {time_step: fast}": "cannot be read",

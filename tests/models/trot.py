@@ -8,7 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from .robots import Robot
+from loco_drake.models.robots import Robot
 
 Array = NDArray[np.float64]
 
