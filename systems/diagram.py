@@ -48,22 +48,15 @@ from .toppra_smoother import ToppraSmoother
 
 @dataclass(frozen=True)
 class Locomotion:
-    """The systems that :func:`AddLocomotion` added, with ports to connect.
+    """The systems that :func:`AddLocomotion` added, with ports to connect."""
 
-    Attributes:
-        robot: the robot.
-        plant: the finalized plant that contains the robot.
-        scene_graph: the plant's scene graph.
-        instance: the robot's model instance in the plant.
-        inputs: input ports by name, see :func:`MakeLocomotionDiagram`.
-        outputs: output ports by name, see :func:`MakeLocomotionDiagram`.
-    """
-
-    robot: Robot
-    plant: MultibodyPlant
-    scene_graph: SceneGraph
-    instance: ModelInstanceIndex
+    robot: Robot  # the robot
+    plant: MultibodyPlant  # the finalized plant that contains the robot
+    scene_graph: SceneGraph  # the plant's scene graph
+    instance: ModelInstanceIndex  # the robot's model instance in the plant
+    # Input ports by name, see MakeLocomotionDiagram.
     inputs: dict[str, InputPort] = field(default_factory=dict)
+    # Output ports by name, see MakeLocomotionDiagram.
     outputs: dict[str, OutputPort] = field(default_factory=dict)
 
     def ExportPorts(self, builder: DiagramBuilder) -> None:

@@ -113,27 +113,20 @@ def unprivileged_mask() -> Tensor:
 
 @dataclass(kw_only=True)
 class ActorConfig:
-    """The properties that a policy was trained with; a mismatch is refused.
+    """The properties that a policy was trained with; a mismatch is refused."""
 
-    Attributes:
-        robot: name of the robot.
-        labels: gait labels in the training.
-        hidden: widths of the hidden layers.
-        observation_layout: names and sizes of the parts of the observation.
-        action_scale: rad per unit of action.
-        rate: actions per second.
-        privileged: whether the policy observes :data:`PRIVILEGED` parts, which a robot
-            outside simulation does not know well.
-    """
-
-    robot: str
-    labels: list[str]
+    robot: str  # name of the robot
+    labels: list[str]  # gait labels in the training
+    # Widths of the hidden layers.
     hidden: list[int] = field(default_factory=lambda: [256, 128])
+    # Names and sizes of the parts of the observation.
     observation_layout: list[list[Any]] = field(
         default_factory=lambda: [list(part) for part in OBSERVATION_LAYOUT]
     )
-    action_scale: float = ACTION_SCALE
-    rate: float = FPS
+    action_scale: float = ACTION_SCALE  # rad per unit of action
+    rate: float = FPS  # actions per second
+    # Whether the policy observes PRIVILEGED parts, which a robot outside simulation
+    # does not know well.
     privileged: bool = True
 
 

@@ -68,17 +68,11 @@ class _Checked:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Push(_Checked):
-    """A constant force at the trunk's origin.
+    """A constant force at the trunk's origin."""
 
-    Attributes:
-        start: Context time, s.
-        duration: s.
-        force_W: force in W, N, shape (3,).
-    """
-
-    start: float
-    duration: float
-    force_W: Array
+    start: float  # Context time, s
+    duration: float  # s
+    force_W: Array  # force in W, N, shape (3,)
 
     def __post_init__(self) -> None:
         self._check("push", {"force_W": 3}, start=(0.0, inf), duration=(0.0, inf))
@@ -86,17 +80,11 @@ class Push(_Checked):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SensorErrors(_Checked):
-    """Errors of the measured state, in the order of :data:`ERROR_LAYOUT`.
+    """Errors of the measured state, in the order of :data:`ERROR_LAYOUT`."""
 
-    Attributes:
-        bias: constant errors, shape (ERROR_SIZE,).
-        white: standard deviations of the white noise, shape (ERROR_SIZE,).
-        seed: seed of the white noise.
-    """
-
-    bias: Array
-    white: Array
-    seed: int
+    bias: Array  # constant errors, shape (ERROR_SIZE,)
+    white: Array  # standard deviations of the white noise, shape (ERROR_SIZE,)
+    seed: int  # seed of the white noise
 
     def __post_init__(self) -> None:
         sizes = {"bias": ERROR_SIZE, "white": ERROR_SIZE}
@@ -109,30 +97,25 @@ class Domain(_Checked):
 
     A Domain is immutable, and a copy is the same object.
 
-    Attributes:
-        friction: Coulomb coefficient of the ground; a contact uses the harmonic mean of
-            this and the feet's.
-        stiffness: stiffness of the ground, N/m, in series with that of the feet.
-        payload: mass added to the trunk, kg.
-        com_shift: shift of the trunk's centre of mass in B, m, shape (3,).
-        strength: torque of each motor over that of its model at the same set-point and
-            state, shape (12,).
-        latency: delay of the set-points, s, rounded to whole steps of the plant.
-        pushes: in any order; overlapping forces add up.
-        sensors: errors of the measured state.
-
     Raises:
         InputError: if a number is not within :data:`BOUNDS`.
     """
 
+    # Coulomb coefficient of the ground; a contact uses the harmonic mean of this and
+    # the feet's.
     friction: float | None = None
+    # Stiffness of the ground, N/m, in series with that of the feet.
     stiffness: float | None = None
-    payload: float | None = None
+    payload: float | None = None  # mass added to the trunk, kg
+    # Shift of the trunk's centre of mass in B, m, shape (3,).
     com_shift: Array | None = None
+    # Torque of each motor over that of its model at the same set-point and state, shape
+    # (12,).
     strength: Array | None = None
+    # Delay of the set-points, s, rounded to whole steps of the plant.
     latency: float = 0.0
-    pushes: tuple[Push, ...] = ()
-    sensors: SensorErrors | None = None
+    pushes: tuple[Push, ...] = ()  # in any order; overlapping forces add up
+    sensors: SensorErrors | None = None  # errors of the measured state
 
     def __post_init__(self) -> None:
         self._check("domain", {"com_shift": 3, "strength": _JOINTS}, **BOUNDS)

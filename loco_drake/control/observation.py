@@ -56,20 +56,12 @@ OBSERVATION_SIZE = sum(size for _, size in OBSERVATION_LAYOUT)
 
 @dataclass(frozen=True)
 class Preview:
-    """The part of a plan that the policy observes, K samples of any leading shape.
+    """The part of a plan that the policy observes, K samples of any leading shape."""
 
-    Attributes:
-        q: positions as in :class:`Plan`, shape (..., K, 19).
-        v: velocities as in :class:`Plan`, shape (..., K, 18).
-        contacts: shape (..., K, 4).
-        label: row of :data:`loco_drake.motion.gaits.ONE_HOT` of the present,
-            shape (...).
-    """
-
-    q: Array
-    v: Array
-    contacts: NDArray[np.bool_]
-    label: NDArray[np.int64]
+    q: Array  # positions as in Plan, shape (..., K, 19)
+    v: Array  # velocities as in Plan, shape (..., K, 18)
+    contacts: NDArray[np.bool_]  # shape (..., K, 4)
+    label: NDArray[np.int64]  # row of motion.gaits.ONE_HOT of the present, shape (...)
 
 
 def preview(plan: Plan, time: float) -> Preview:

@@ -37,31 +37,22 @@ class Plan:
     compared by identity. Copying returns the same object, because Drake copies all
     abstract state at each unrestricted update.
 
-    Attributes:
-        start_time: Context time of the first sample, s.
-        q: positions, m and rad, shape (N, 7 + J).
-        v: velocities, m/s and rad/s, shape (N, 6 + J).
-        vdot: time derivatives of ``v``, shape (N, 6 + J).
-        p_WF: centres of the toe spheres in m, shape (N, 4, 3).
-        contacts: whether each foot should be on the ground, shape (N, 4).
-        labels: row of :data:`loco_drake.motion.gaits.ONE_HOT`, shape (N,).
-        path_time: time in the motion before smoothing, s, shape (N,); the smoother
-            slows this clock down where the robot could not keep up.
-        open_ended: whether the producer will extend the plan.
-
     Raises:
         InputError: if an array has an invalid type, shape or value.
     """
 
-    start_time: float
-    q: Array
-    v: Array
-    vdot: Array
-    p_WF: Array
+    start_time: float  # Context time of the first sample, s
+    q: Array  # positions, m and rad, shape (N, 7 + J)
+    v: Array  # velocities, m/s and rad/s, shape (N, 6 + J)
+    vdot: Array  # time derivatives of v, shape (N, 6 + J)
+    p_WF: Array  # centres of the toe spheres in m, shape (N, 4, 3)
+    # Whether each foot should be on the ground, shape (N, 4).
     contacts: NDArray[np.bool_]
-    labels: NDArray[np.int64]
+    labels: NDArray[np.int64]  # row of motion.gaits.ONE_HOT, shape (N,)
+    # Time in the motion before smoothing, s, shape (N,); the smoother slows this clock
+    # down where the robot could not keep up.
     path_time: Array
-    open_ended: bool = False
+    open_ended: bool = False  # whether the producer will extend the plan
 
     def __post_init__(self) -> None:
         n, size = np.shape(self.q) if np.ndim(self.q) == 2 else (0, 0)

@@ -36,15 +36,10 @@ _CLOCK_STOP_TIME = 0.5
 
 @dataclass(frozen=True)
 class PathLimits:
-    """Limits of each coordinate of a path.
+    """Limits of each coordinate of a path."""
 
-    Attributes:
-        speed: in both directions, shape (D,).
-        acceleration: lower and upper, shape (D, 2).
-    """
-
-    speed: Array
-    acceleration: Array
+    speed: Array  # in both directions, shape (D,)
+    acceleration: Array  # lower and upper, shape (D, 2)
 
 
 def path_limits(robot: Robot) -> PathLimits:
@@ -105,15 +100,10 @@ class _FreeEndTOPPRA(TOPPRA):
 
 @dataclass(frozen=True)
 class Clock:
-    """Progress along the plan, sampled every PLAN_DT of real time.
+    """Progress along the plan, sampled every PLAN_DT of real time."""
 
-    Attributes:
-        path_time: plan time s in s, shape (N,).
-        rate: ds/dt, at most 1, shape (N,).
-    """
-
-    path_time: Array
-    rate: Array
+    path_time: Array  # plan time s in s, shape (N,)
+    rate: Array  # ds/dt, at most 1, shape (N,)
 
 
 def retime(
@@ -203,19 +193,12 @@ def _sample(grid: Array, rates: Array, commit: float) -> Clock:
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """The state of re-timing a plan. It is immutable, and a copy is the same object.
+    """The state of re-timing a plan. It is immutable, and a copy is the same object."""
 
-    Attributes:
-        plan: the re-timed plan.
-        path_time: plan time of its last sample, s.
-        rate: ds/dt of its last sample.
-        source: the plan that was re-timed; None at first.
-    """
-
-    plan: Plan
-    path_time: float = 0.0
-    rate: float = 1.0
-    source: Plan | None = None
+    plan: Plan  # the re-timed plan
+    path_time: float = 0.0  # plan time of its last sample, s
+    rate: float = 1.0  # ds/dt of its last sample
+    source: Plan | None = None  # the plan that was re-timed; None at first
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Progress":
         return self

@@ -29,21 +29,13 @@ TOUCHING, LIFTING = 0.55, 0.45  # probabilities at which a contact begins and en
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """State of base and feet after a frame, for B motions.
+    """State of base and feet after a frame, for B motions."""
 
-    Attributes:
-        pose: x, y in m and yaw in rad of the base, shape (B, 3).
-        shift: displacement of the base by the feet in the frame, m, shape (B, 2).
-        anchor: foothold of each foot, x and y in m, shape (B, 4, 2).
-        offset: displacement of each toe in W, m, shape (B, 4, 3).
-        contacts: feet in stance, shape (B, 4).
-    """
-
-    pose: Array
-    shift: Array
-    anchor: Array
-    offset: Array
-    contacts: NDArray[np.bool_]
+    pose: Array  # x, y in m and yaw in rad of the base, shape (B, 3)
+    shift: Array  # displacement of the base by the feet in the frame, m, shape (B, 2)
+    anchor: Array  # foothold of each foot, x and y in m, shape (B, 4, 2)
+    offset: Array  # displacement of each toe in W, m, shape (B, 4, 3)
+    contacts: NDArray[np.bool_]  # feet in stance, shape (B, 4)
 
 
 def start_footing(pose: Array) -> Footing:

@@ -27,33 +27,20 @@ SHORTEST, LONGEST = 0.5, 16.0  # s
 
 @dataclass(frozen=True)
 class GeneratorConfig:
-    """Sizes of a :class:`Generator`.
-
-    Attributes:
-        tokenizer: fingerprint of the tokenizer.
-        codebooks: number of its codebooks to predict, the coarsest first.
-        codebook_size: codes in a codebook.
-        frames_per_token: frames that a token stands for.
-        labels: names of the gait labels it was trained on.
-        window: tokens of context at the start of a chunk.
-        width: channels.
-        layers: transformer blocks.
-        heads: attention heads.
-        dropout: probability, while training.
-    """
+    """Sizes of a :class:`Generator`."""
 
     BEFORE: ClassVar = {"books": "codebooks", "book_size": "codebook_size"}
 
-    tokenizer: str
-    codebooks: int
-    codebook_size: int
-    frames_per_token: int
-    labels: tuple[str, ...]
-    window: int = 16
-    width: int = 128
-    layers: int = 3
-    heads: int = 4
-    dropout: float = 0.1
+    tokenizer: str  # fingerprint of the tokenizer
+    codebooks: int  # number of its codebooks to predict, the coarsest first
+    codebook_size: int  # codes in a codebook
+    frames_per_token: int  # frames that a token stands for
+    labels: tuple[str, ...]  # names of the gait labels it was trained on
+    window: int = 16  # tokens of context at the start of a chunk
+    width: int = 128  # channels
+    layers: int = 3  # transformer blocks
+    heads: int = 4  # attention heads
+    dropout: float = 0.1  # probability, while training
 
 
 # Keys and values of each layer for the times seen so far.

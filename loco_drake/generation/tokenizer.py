@@ -21,29 +21,19 @@ from loco_drake.generation.layers import ConvBlock
 
 @dataclass(frozen=True)
 class TokenizerConfig:
-    """Sizes of a :class:`Tokenizer`.
-
-    Attributes:
-        robots: robots of the training; encoder and decoder are conditioned on one.
-        frames_per_token: downsampling factor.
-        width: channels of the hidden layers at the rate of tokens.
-        depth: residual blocks at that rate, in encoder and decoder each.
-        frame_width: channels of the decoder's layers at the rate of frames.
-        code_size: dimension of a code.
-        codebooks: residual codebooks; a token is one code of each.
-        codebook_size: codes in a codebook.
-    """
+    """Sizes of a :class:`Tokenizer`."""
 
     BEFORE: ClassVar = {"books": "codebooks", "book_size": "codebook_size"}
 
+    # Robots of the training; encoder and decoder are conditioned on one.
     robots: tuple[str, ...] = ("go2",)
-    frames_per_token: int = 4
-    width: int = 128
-    depth: int = 3
-    frame_width: int = 48
-    code_size: int = 48
-    codebooks: int = 12
-    codebook_size: int = 128
+    frames_per_token: int = 4  # downsampling factor
+    width: int = 128  # channels of the hidden layers at the rate of tokens
+    depth: int = 3  # residual blocks at that rate, in encoder and decoder each
+    frame_width: int = 48  # channels of the decoder's layers at the rate of frames
+    code_size: int = 48  # dimension of a code
+    codebooks: int = 12  # residual codebooks; a token is one code of each
+    codebook_size: int = 128  # codes in a codebook
 
 
 class Tokenizer(nn.Module):

@@ -31,17 +31,11 @@ LossFunction = Callable[[np.random.Generator], tuple[Tensor, dict[str, float]]]
 
 @dataclass(frozen=True)
 class LoopResult:
-    """Result of :func:`train`.
+    """Result of :func:`train`."""
 
-    Attributes:
-        steps: optimizer steps taken in all, those before a resume included.
-        stopped: whether it was stopped by Ctrl-C before its last step.
-        loss: of the last batch.
-    """
-
-    steps: int
-    stopped: bool
-    loss: float
+    steps: int  # optimizer steps taken in all, those before a resume included
+    stopped: bool  # whether it was stopped by Ctrl-C before its last step
+    loss: float  # of the last batch
 
 
 def train(

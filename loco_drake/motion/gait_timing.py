@@ -46,21 +46,13 @@ _DOWN_SPEED = 0.5  # stance heights per second
 
 @dataclass(frozen=True)
 class Track:
-    """Trunk and soles of an animal or robot over time.
+    """Trunk and soles of an animal or robot over time."""
 
-    Attributes:
-        fps: frames per second.
-        trunk: horizontal position of the trunk's middle in m, shape (T, 2).
-        yaw: heading of the trunk in rad, shape (T,).
-        soles: lowest points of the toes in m, ground at z = 0, shape (T, 4, 3).
-        stance_height: of the animal or robot in m, the unit of length.
-    """
-
-    fps: float
-    trunk: Array
-    yaw: Array
-    soles: Array
-    stance_height: float
+    fps: float  # frames per second
+    trunk: Array  # horizontal position of the trunk's middle in m, shape (T, 2)
+    yaw: Array  # heading of the trunk in rad, shape (T,)
+    soles: Array  # lowest points of the toes in m, ground at z = 0, shape (T, 4, 3)
+    stance_height: float  # of the animal or robot in m, the unit of length
 
     @property
     def fore_aft(self) -> Array:
@@ -73,17 +65,11 @@ class Track:
 
 @dataclass(frozen=True)
 class GaitTiming:
-    """Gait timing of a clip; see the definitions above.
+    """Gait timing of a clip; see the definitions above."""
 
-    Attributes:
-        stride_period: s.
-        phase_lags: behind RL, as shares of the stride within [0, 1), shape (4,).
-        duty_factors: shape (4,).
-    """
-
-    stride_period: float
-    phase_lags: Array
-    duty_factors: Array
+    stride_period: float  # s
+    phase_lags: Array  # behind RL, as shares of the stride within [0, 1), shape (4,)
+    duty_factors: Array  # shape (4,)
 
 
 def clip_track(clip: KeypointClip, stance_height: float) -> Track:

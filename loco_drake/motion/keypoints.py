@@ -16,23 +16,16 @@ class KeypointClip:
 
     The ground is the plane z = 0 and the clip starts heading along +x. This is the only
     input of :mod:`loco_drake.retargeting`.
-
-    Attributes:
-        source: name of the animal or robot, such as dog; need not be a known one.
-        gait: name of the gait; need not be one of the fifteen labels.
-        fps: frames per second of the arrays, the source's own rate.
-        withers: position of the withers, shape (T, 3).
-        hip: position of the hip (top of the pelvis), shape (T, 3).
-        toes: positions of the toes, shape (T, 4, 3), legs FL, FR, RL, RR.
-        provenance: origin of the frames as text (file, frames, licence, ...).
     """
 
-    source: str
-    gait: str
-    fps: float
-    withers: NDArray[np.float64]
-    hip: NDArray[np.float64]
+    source: str  # name of the animal or robot, such as dog; need not be a known one
+    gait: str  # name of the gait; need not be one of the fifteen labels
+    fps: float  # frames per second of the arrays, the source's own rate
+    withers: NDArray[np.float64]  # position of the withers, shape (T, 3)
+    hip: NDArray[np.float64]  # position of the hip (top of the pelvis), shape (T, 3)
+    # Positions of the toes, shape (T, 4, 3), legs FL, FR, RL, RR.
     toes: NDArray[np.float64]
+    # Origin of the frames as text (file, frames, licence, ...).
     provenance: dict[str, str]
 
     def __post_init__(self) -> None:
