@@ -132,10 +132,7 @@ def _samples_of_sets(robot: Robot, sets: Sequence[Sequence[Motion]]) -> list[Sam
     """Returns samples of each set; motions without a subject are one each."""
     joined = make_samples(robot, [motion for each in sets for motion in each])
     ends = np.cumsum([len(each) for each in sets])
-    return [
-        joined[np.arange(end - len(each), end)]
-        for each, end in zip(sets, ends, strict=True)
-    ]
+    return [joined[rows] for rows in np.split(np.arange(len(joined)), ends[:-1])]
 
 
 def _confusion(recognition: dict[str, Recognition]) -> dict[str, Any]:

@@ -37,17 +37,8 @@ class Bound:
 
 
 @dataclass
-class Price(Figure):
+class Price(Figure, Bound):
     """A second figure for a goal, which is missed if it is out of bounds."""
-
-    text: str = ""
-    least: float = -inf
-    most: float = inf
-
-    @property
-    def bound(self) -> Bound:
-        """What the goal allows."""
-        return Bound(self.least, self.most)
 
 
 @dataclass

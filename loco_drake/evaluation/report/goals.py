@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from math import inf
 
-from loco_drake.evaluation.report.content import CONTENT, Bound, Figure, Goal
+from loco_drake.evaluation.report.content import CONTENT, Figure, Goal
 from loco_drake.evaluation.report.results import Figures, Results
 from loco_drake.models.robots import ROBOTS
 
@@ -83,10 +83,10 @@ def measure(goal: Goal, results: Results, robot: str) -> Measured | None:
     paid = _read(figure, results, robot)
     if paid is None:
         note = f"{price.text.partition(' {')[0]} not measured"
-        within = price.bound == Bound()
+        within = (price.least, price.most) == (-inf, inf)
     else:
         note = price.text.format(paid.value)
-        within = paid.value in price.bound
+        within = paid.value in price
     return replace(found, notes=(*found.notes, note), paid=within)
 
 

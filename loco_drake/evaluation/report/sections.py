@@ -110,8 +110,8 @@ def _drift(figures: Figures, row: Row) -> Cell:
     if worst is None:
         return Cell(NOTHING)
     value, what = worst
-    what = what.removesuffix("_mps").removesuffix("_m").removesuffix("_s")
-    return Cell(number(value, 2), note=what.replace("_", " "))
+    name = what.rpartition("_")[0] or what  # without its unit
+    return Cell(number(value, 2), note=name.replace("_", " "))
 
 
 def realism_table(robots: dict[str, Figures]) -> Table:

@@ -6,6 +6,7 @@ import pytest
 
 from loco_drake.evaluation.report.content import Column
 from loco_drake.evaluation.report.results import Figures
+from loco_drake.evaluation.report.sections import generation_table
 from loco_drake.evaluation.report.tables import label_table, number
 
 
@@ -38,3 +39,18 @@ def test_labels_in_order_and_all_last_with_reasons():
     assert [row.title for row in table.rows] == ["dog-trot", "solo8-wave", "all"]
     assert [row.cells[0].text for row in table.rows] == ["–", "3.4", "5.6"]
     assert table.reasons == ["dog-trot: no toe ever stands"]
+
+
+def test_what_drifts_most_is_named_without_its_unit():
+    drifts = {"turn_rate_radps": {"drift": 1.5}, "stance_slip_median_mps": {"drift": 1}}
+    figures = {
+        "labels": {"dog-trot": {}, "dog-pace": {}},
+        "all": {},
+        "drift_60s": 1.5,
+        "drift": {"labels": {"dog-trot": drifts}},
+    }
+    table = generation_table("go2", Figures(figures, Path("f.json")))
+    cells = {row.title: row.cells[-1] for row in table.rows}
+    assert (cells["dog-trot"].text, cells["dog-trot"].note) == ("1.50", "turn rate")
+    assert (cells["all"].text, cells["all"].note) == ("1.50", "")
+    assert cells["dog-pace"].text == "–"
