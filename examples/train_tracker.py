@@ -19,7 +19,7 @@ from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
 from loco_drake.tracking.config import PpoConfig, TrainingConfig
-from loco_drake.tracking.train import Progress, train_tracker
+from loco_drake.tracking.train import train_tracker
 
 
 def train(
@@ -58,16 +58,15 @@ def train(
         workers=workers,
         ppo=PpoConfig(batch=batch, minibatch=batch // 4),
     )
+
+    def show(done: int, scores: dict[str, float]) -> None:
+        returns = ", ".join(f"{label} {r:.1f}" for label, r in scores.items())
+        print(f"{done} of {steps} steps: {returns}", flush=True)
+
     figures = train_tracker(plans, config, out, report=show)
-    show(Progress(figures["steps"], steps, figures["scores"]))
+    show(figures["steps"], figures["scores"])
     seconds = figures["wall_clock_s"]
     print(f"{seconds:.0f} s; the policy is {out / 'policy.safetensors'}")
-
-
-def show(progress: Progress) -> None:
-    """Prints the returns, after each batch."""
-    returns = ", ".join(f"{label} {r:.1f}" for label, r in progress.scores.items())
-    print(f"{progress.steps} of {progress.total} steps: {returns}", flush=True)
 
 
 if __name__ == "__main__":  # workers import this file again

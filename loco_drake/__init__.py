@@ -11,7 +11,7 @@ known.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from loco_drake.tracking.registration import register
+import gymnasium
 
 if TYPE_CHECKING:
     from loco_drake.common.errors import InputError as InputError
@@ -77,4 +77,8 @@ def __dir__() -> list[str]:
     return [*globals(), *__all__]
 
 
-register()
+# Since version 1 of Gymnasium there are no entry points for this.
+gymnasium.register(
+    id="loco_drake/Tracking-v0",
+    entry_point="loco_drake.tracking.environment:make_tracking",
+)

@@ -136,7 +136,7 @@ def trained_on(
     Returns:
         Names of subjects by kind; None where the weights do not say.
     """
-    from loco_drake.generation.training_record import (
+    from loco_drake.generation.training_motions import (
         read_training_record,
         seen_in_training,
     )

@@ -53,7 +53,6 @@ class Generate:
         from loco_drake.generation.generate import (
             check_duration,
             check_sampling,
-            check_speed_rank,
             generate_motions,
         )
         from loco_drake.generation.motion_model import load_motion_model
@@ -63,8 +62,7 @@ class Generate:
         schedule = parse_schedule(self.gait)
         check_duration(self.duration)
         schedule.check_ends_by(self.duration)
-        check_sampling(self.temperature, self.top_p)
-        check_speed_rank(self.pace)
+        check_sampling(self.temperature, self.top_p, self.pace)
         check_choice("robot", self.robot, ROBOTS)
         check_at_least("count", self.count, 1)
         check_at_least("seed", self.seed, 0)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import tyro
 
@@ -12,9 +12,6 @@ from loco_drake.cli.training import print_stopped
 from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.common.progress import progress_bar
 from loco_drake.tracking.config import TrainingConfig
-
-if TYPE_CHECKING:
-    from loco_drake.tracking.train import Progress as TrainingProgress
 
 
 @dataclass(kw_only=True)
@@ -60,9 +57,9 @@ class TrainTracker(TrainingConfig):
         with progress_bar() as bar:
             task = bar.add_task("tracker", total=self.steps, note="")
 
-            def report(progress: "TrainingProgress") -> None:
-                note = f"return {fmean(progress.scores.values()):.1f} of 100"
-                bar.update(task, completed=progress.steps, note=note)
+            def report(steps: int, scores: dict[str, float]) -> None:
+                note = f"return {fmean(scores.values()):.1f} of 100"
+                bar.update(task, completed=steps, note=note)
 
             figures = train_tracker(
                 plans,

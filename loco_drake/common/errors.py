@@ -69,10 +69,27 @@ def check_choice(what: str, value: str, choices: Iterable[str]) -> str:
 
 
 def check_at_least(option: str, value: int, least: int) -> None:
-    """Raises InputError if ``value`` is below ``least``."""
-    if value < least:
-        name = option.replace("_", "-")
-        raise InputError(f"--{name} must be {least} or more, not {value}.")
+    """Raises InputError if the value of a command's option is below ``least``."""
+    check_bounds(f"--{option.replace('_', '-')}", value, least)
+
+
+def check_bounds(
+    what: str, value: float, low: float, high: float = inf, *, above: bool = False
+) -> None:
+    """Raises InputError unless ``value`` is finite and from ``low`` to ``high``.
+
+    Args:
+        what: its name, which begins the sentence.
+        value: what was given.
+        low: the least that is allowed.
+        high: the most; infinity for no bound.
+        above: whether ``low`` itself is not allowed.
+    """
+    enough = value > low if above else value >= low
+    if not (enough and value <= high and value != inf):
+        least = f"above {low:g}" if above else f"{low:g} or more"
+        most = "" if high == inf else f" and at most {high:g}"
+        raise InputError(f"{what} must be {least}{most}, not {value}.")
 
 
 def check_number(what: str, value: Any, low: float, high: float = inf) -> None:

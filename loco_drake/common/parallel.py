@@ -38,20 +38,15 @@ def map_in_workers(
         ChildProcessError: if a worker process is killed.
     """
     check_at_least("workers", workers, 1)
-    return _map_here(make, items) if workers == 1 else _map(make, items, workers)
-
-
-def _map_here(
-    make: Callable[[], Callable[[Item], Result]], items: Iterable[Item]
-) -> Iterator[Result]:
-    function = make()
-    for item in items:
-        yield function(item)
+    return _map(make, items, workers)
 
 
 def _map(
     make: Callable[[], Callable[[Item], Result]], items: Iterable[Item], workers: int
 ) -> Iterator[Result]:
+    if workers == 1:
+        yield from map(make(), items)
+        return
     executor = ProcessPoolExecutor(
         max_workers=workers,
         mp_context=multiprocessing.get_context("spawn"),

@@ -1,6 +1,7 @@
 """Run folders of trainings: exclusive, never overwritten, resumable."""
 
 import fcntl
+import json
 import os
 import signal
 import threading
@@ -73,30 +74,25 @@ def read_checkpoint(path: Path, name: str) -> Checkpoint:
         )
 
 
+@dataclass(frozen=True)
 class RunFolder:
     """A folder locked by one training.
 
     Attributes:
+        path: of the checkpoint.
+        kind: of the checkpoint.
+        header: "run" and "options", see :class:`Checkpoint`.
         saved: the checkpoint to continue from, None at the start.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        name: str,
-        run: Mapping[str, Any],
-        options: Mapping[str, Any],
-        saved: Checkpoint | None,
-    ) -> None:
-        self.saved = saved
-        self._path = folder / CHECKPOINT
-        self._name = name
-        self._header = {"run": dict(run), "options": dict(options)}
+    path: Path
+    kind: str
+    header: dict[str, Any]
+    saved: Checkpoint | None
 
     def save(self, tensors: dict[str, Tensor], state: dict[str, Any]) -> None:
         """Replaces the checkpoint; see :class:`Checkpoint`."""
-        header = {**self._header, "state": state}
-        save_weights(self._path, f"{self._name} checkpoint", tensors, header)
+        save_weights(self.path, self.kind, tensors, {**self.header, "state": state})
 
 
 @contextmanager
@@ -144,7 +140,8 @@ def open_run(
             check_same(saved, run, settings(options), steps)
         for unfinished in folder.glob(".*.safetensors"):
             unfinished.unlink()  # left by a training that was killed
-        yield RunFolder(folder, name, run, options, saved)
+        header = {"run": dict(run), "options": dict(options)}
+        yield RunFolder(folder / CHECKPOINT, f"{name} checkpoint", header, saved)
     finally:
         os.close(handle)
 
@@ -209,17 +206,9 @@ def settings(options: Mapping[str, Any], *without: str) -> dict[str, Any]:
 
 
 def options_of(config: Any) -> dict[str, Any]:
-    """Returns a dataclass as nested JSON."""
-
-    def plain(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {key: plain(inner) for key, inner in value.items()}
-        if isinstance(value, list | tuple):
-            return [plain(inner) for inner in value]
-        return str(value) if isinstance(value, Path) else value
-
-    converted: dict[str, Any] = plain(asdict(config))
-    return converted
+    """Returns a dataclass as nested JSON; paths are text."""
+    options: dict[str, Any] = json.loads(json.dumps(asdict(config), default=str))
+    return options
 
 
 def with_options(config: Config, options: Mapping[str, Any]) -> Config:

@@ -53,27 +53,6 @@ def motion_features(robot: Robot, motion: Motion) -> Array:
     return features
 
 
-def integrate_path(robot: Robot, features: Array, pose: Array) -> Array:
-    """Returns the base's path for given features.
-
-    This is the exact inverse of the differences in :func:`motion_features`.
-
-    Args:
-        robot: gives the unit of length.
-        features: shape (..., T, SIZE).
-        pose: x, y in m and yaw in rad of the frame before the first, shape (..., 3).
-
-    Returns:
-        x, y, yaw of the T frames, shape (..., T, 3).
-    """
-    turn = features[..., YAW_RATE][..., 0] / FPS
-    yaw = pose[..., None, 2] + np.cumsum(turn, axis=-1)
-    step_H = features[..., VELOCITY] * robot.stand_height / FPS
-    steps = rotate_plane(step_H, yaw - turn / 2)
-    xy = pose[..., None, :2] + np.cumsum(steps, axis=-2)
-    return np.concatenate((xy, yaw[..., None]), axis=-1)
-
-
 def positions(robot: Robot, features: Array, path: Array) -> Array:
     """Returns q = [R_WB as w x y z, p_WB, joints], shape (..., T, 19).
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.common.errors import InputError
+from loco_drake.common.errors import InputError, check_bounds
 from loco_drake.generation.motion_model import MotionModel
 from loco_drake.motion.gait_schedule import GaitSchedule
 from loco_drake.motion.gaits import ROW_LABELS, GaitLabel
@@ -45,8 +45,7 @@ def generate_motions(
         InputError: if an argument is not as said.
     """
     check_duration(duration)
-    check_sampling(temperature, top_p)
-    check_speed_rank(speed_rank)
+    check_sampling(temperature, top_p, speed_rank)
     schedule = GaitSchedule((gait,)) if isinstance(gait, GaitLabel) else gait
     schedule.check_ends_by(duration)
     if any(seed < 0 for seed in seeds):
@@ -122,7 +121,7 @@ def check_duration(duration: float) -> None:
 
     A motion has three frames at least, of which velocities can be told.
     """
-    if not (np.isfinite(duration) and 0 < duration <= LONGEST_DURATION):
+    if not 0 < duration <= LONGEST_DURATION:
         raise InputError(
             f"The duration must be above 0 and at most {LONGEST_DURATION:g} s, "
             f"not {duration:g}."
@@ -133,16 +132,10 @@ def check_duration(duration: float) -> None:
         )
 
 
-def check_sampling(temperature: float, top_p: float) -> None:
-    """Raises InputError unless the temperature is >= 0 and top_p in (0, 1]."""
-    if not (np.isfinite(temperature) and temperature >= 0):
-        raise InputError(f"The temperature must be 0 or more, not {temperature:g}.")
-    if not 0 < top_p <= 1:
-        raise InputError(f"top_p must be above 0 and at most 1, not {top_p:g}.")
-
-
-def check_speed_rank(speed_rank: float | None) -> None:
-    """Raises InputError unless the speed rank is None or in [0, 1]."""
+def check_sampling(temperature: float, top_p: float, speed_rank: float | None) -> None:
+    """Raises InputError unless :func:`generate_motions` takes these."""
+    check_bounds("The temperature", temperature, 0)
+    check_bounds("top_p", top_p, 0, 1, above=True)
     if speed_rank is not None and not 0 <= speed_rank <= 1:
         raise InputError(
             f"The pace must be from 0, the slowest that the gait was recorded at, to "

@@ -1,10 +1,9 @@
 """Settings of network training, separate from the training, which imports slowly."""
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from loco_drake.common.errors import InputError, check_at_least
+from loco_drake.common.errors import check_at_least, check_bounds
 
 
 @dataclass
@@ -34,11 +33,5 @@ class LoopSettings:
         """Raises InputError unless every setting can be used."""
         for name in ("steps", "checkpoint_every", "log_every"):
             check_at_least(name, getattr(self, name), 1)
-        if not (math.isfinite(self.learning_rate) and self.learning_rate > 0):
-            raise InputError(
-                f"--learning-rate must be above 0, not {self.learning_rate:g}."
-            )
-        if not 0 <= self.weight_decay < math.inf:
-            raise InputError(
-                f"--weight-decay must be 0 or more, not {self.weight_decay:g}."
-            )
+        check_bounds("--learning-rate", self.learning_rate, 0, above=True)
+        check_bounds("--weight-decay", self.weight_decay, 0)

@@ -129,11 +129,8 @@ class MotionModel:
         self.frames_per_token = tokenizer.config.frames_per_token
         self.chunk_tokens = round(CHUNK_SECONDS * FPS / self.frames_per_token)
         self._robot_index = tokenizer.config.robots.index(robot)
-        self._known = {
-            index
-            for index, label in enumerate(LABELS)
-            if str(label) in generator.config.labels
-        }
+        known = generator.config.labels
+        self._known = {i for i, label in enumerate(LABELS) if str(label) in known}
 
     @property
     def chunk_frames(self) -> int:
@@ -160,16 +157,12 @@ class MotionModel:
         seeds = np.array(seeds, dtype=np.int64)
         batch = len(seeds)
         codebooks = self.generator.config.codebooks
+        if speed_rank is None:
+            speed_rank = drawn_rank(seeds)
         return Stream(
             seeds=seeds,
-            duration=np.broadcast_to(np.asarray(duration, np.float64), (batch,)).copy(),
-            speed_rank=(
-                drawn_rank(seeds)
-                if speed_rank is None
-                else np.broadcast_to(
-                    np.asarray(speed_rank, np.float64), (batch,)
-                ).copy()
-            ),
+            duration=np.full(batch, duration, dtype=np.float64),
+            speed_rank=np.full(batch, speed_rank, dtype=np.float64),
             chunk=0,
             tokens=np.zeros((batch, 0, codebooks), dtype=np.int64),
             labels=np.zeros((batch, 0), dtype=np.int64),
@@ -282,7 +275,14 @@ class MotionModel:
         )
         frames = Frames(
             q=q[:, 1:-1],
-            v=_velocities(q),
+            v=np.concatenate(
+                (
+                    quat_error(q[:, :-2, :4], q[:, 2:, :4]),
+                    q[:, 2:, 4:] - q[:, :-2, 4:],
+                ),
+                axis=-1,
+            )
+            * (FPS / 2),
             contacts=contacts[:, :-1],
             labels=frame_labels[:, self.frames_per_token - 1 : -1],
         )
@@ -328,13 +328,6 @@ def load_motion_model(tokenizer: Path, generator: Path, robot: str) -> MotionMod
         InputError: if one is missing or damaged, or they do not belong together.
     """
     return MotionModel(load_tokenizer(tokenizer), load_generator(generator), robot)
-
-
-def _velocities(q: Array) -> Array:
-    """Returns central differences (B, T - 2, 18) of q (B, T, 19)."""
-    turning = quat_error(q[:, :-2, :4], q[:, 2:, :4])
-    moving = q[:, 2:, 4:] - q[:, :-2, 4:]
-    return np.concatenate((turning, moving), axis=-1) * (FPS / 2)
 
 
 @lru_cache

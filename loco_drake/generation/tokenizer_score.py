@@ -4,14 +4,85 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from loco_drake.common.determinism import single_thread
-from loco_drake.generation.features import JOINTS
-from loco_drake.generation.toes import Toes
+from loco_drake.generation.features import (
+    HEIGHT,
+    JOINTS,
+    ROLL_PITCH,
+    VELOCITY,
+    YAW_RATE,
+)
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.training_motions import Clip
-from loco_drake.models.robots import get_robot
+from loco_drake.models.robots import Robot, get_robot
+from loco_drake.motion.motion import FPS
+
+
+class Toes(nn.Module):
+    """Differentiable kinematics of several robots in one batch.
+
+    Args:
+        robots: features of a batch can be of any of these, by index.
+    """
+
+    def __init__(self, robots: list[Robot]) -> None:
+        super().__init__()
+
+        def table(values: list[object]) -> Tensor:
+            return torch.tensor(values, dtype=torch.float32)
+
+        self.hips = table([robot.p_BHip.tolist() for robot in robots])
+        self.offset = table([robot.abduction_offset.tolist() for robot in robots])
+        self.thigh = table([robot.thigh_length for robot in robots])
+        self.calf = table([robot.calf_length for robot in robots])
+        self.stand_height = table([robot.stand_height for robot in robots])
+
+    def positions(self, features: Tensor, robot: Tensor) -> Tensor:
+        """Returns the centres of the toe spheres in m, shape (B, T, 4, 3).
+
+        They are relative to the point on the ground under the trunk, in the heading
+        frame H.
+
+        Args:
+            features: shape (B, T, SIZE).
+            robot: index of each sequence's robot, shape (B,).
+        """
+        joints = features[..., JOINTS]  # then leg by leg, (B, T, 4, 3)
+        hip, thigh, calf = joints.reshape(*joints.shape[:-1], 4, 3).unbind(-1)
+        l1, l2 = self.thigh[robot, None, None], self.calf[robot, None, None]
+        side = self.offset[robot][:, None]  # (B, 1, 4)
+        forward = -l1 * thigh.sin() - l2 * (thigh + calf).sin()
+        down = -l1 * thigh.cos() - l2 * (thigh + calf).cos()
+        left = hip.cos() * side - hip.sin() * down
+        up = hip.sin() * side + hip.cos() * down
+        p_B = torch.stack((forward, left, up), dim=-1) + self.hips[robot][:, None]
+        x, y, z = p_B.unbind(-1)
+        roll, pitch = features[..., None, ROLL_PITCH].unbind(-1)  # (B, T, 1)
+        y, z = roll.cos() * y - roll.sin() * z, roll.sin() * y + roll.cos() * z
+        x, z = pitch.cos() * x + pitch.sin() * z, pitch.cos() * z - pitch.sin() * x
+        height = features[..., HEIGHT] * self.stand_height[robot, None, None]
+        return torch.stack((x, y, z + height), dim=-1)
+
+    def velocities(self, features: Tensor, p_HF: Tensor, robot: Tensor) -> Tensor:
+        """Returns velocities of the toes over the ground in m/s, (B, T - 1, 4, 3).
+
+        Uses backward differences in the heading frame; the velocity of a stance foot is
+        zero.
+
+        Args:
+            features: shape (B, T, SIZE).
+            p_HF: from :meth:`positions`.
+            robot: index of each sequence's robot, shape (B,).
+        """
+        speed = features[:, 1:, VELOCITY] * self.stand_height[robot, None, None]
+        rate = features[:, 1:, YAW_RATE]  # (B, T - 1, 1)
+        middle = (p_HF[:, 1:] + p_HF[:, :-1]) / 2
+        x, y, _ = middle.unbind(-1)  # (B, T - 1, 4)
+        turning = torch.stack((-rate * y, rate * x, torch.zeros_like(x)), dim=-1)
+        moving = torch.cat((speed, torch.zeros_like(speed[..., :1])), dim=-1)
+        return (p_HF[:, 1:] - p_HF[:, :-1]) * FPS + turning + moving[:, :, None]
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,7 @@ from loco_drake.generation.stitching import Stitcher
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.tokenizer_score import clip_tensor
 from loco_drake.generation.training import LoopResult, train
-from loco_drake.generation.training_motions import Clip, Library
-from loco_drake.generation.training_record import training_record
+from loco_drake.generation.training_motions import Clip, Library, training_record
 from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.motion import FPS
 

@@ -19,11 +19,10 @@ from vector_quantize_pytorch import ResidualVQ
 from loco_drake.common.errors import InputError
 from loco_drake.generation.features import CONTACTS
 from loco_drake.generation.loop_settings import LoopSettings
-from loco_drake.generation.toes import Toes
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
+from loco_drake.generation.tokenizer_score import Toes
 from loco_drake.generation.training import LoopResult, train
-from loco_drake.generation.training_motions import Clip, Library
-from loco_drake.generation.training_record import training_record
+from loco_drake.generation.training_motions import Clip, Library, training_record
 from loco_drake.generation.windows import WINDOW, PairedWindows
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS

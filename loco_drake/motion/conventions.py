@@ -146,8 +146,8 @@ def _check_velocities(motion: Motion) -> None:
     fps, q = motion.fps, quat_continuous(motion.base_quaternion)
     xyzw = quat_continuous(motion.base_quaternion[:, [3, 0, 1, 2]])
     turning = angular_velocity(q, 1 / fps)[1:-1]
-    base = _differences(motion.base_position, fps)
-    joints = _differences(motion.joint_positions, fps)
+    base = np.gradient(motion.base_position, 1 / fps, axis=0)[1:-1]
+    joints = np.gradient(motion.joint_positions, 1 / fps, axis=0)[1:-1]
     factor = _rms(motion.base_velocity[1:-1]) / max(_rms(base), _TINY)
     # Differences of what is fast are a little too small, which is no other rate.
     other_rate = factor > _TINY and abs(np.log(factor)) > 0.15
@@ -194,11 +194,6 @@ def _check_velocities(motion: Motion) -> None:
                 f"The values of {name} are not the derivatives of {of}, in {unit} at "
                 f"{fps:g} frames/s" + (f"; they are {best}." if found else ".")
             )
-
-
-def _differences(values: Array, fps: float) -> Array:
-    differences: Array = (values[2:] - values[:-2]) * (fps / 2)
-    return differences
 
 
 def _rms(values: Array) -> float:

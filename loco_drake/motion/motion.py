@@ -72,7 +72,37 @@ class Motion:
     gait_changes: tuple[tuple[int, GaitLabel], ...] = ()
 
     def __post_init__(self) -> None:
-        _check(self)
+        check_name("robot", self.robot)
+        GaitLabel(self.source, self.gait)  # checks the names
+        starts = [start for start, _ in self.gait_changes]
+        if starts and (starts[0] != 0 or sorted(set(starts)) != starts):
+            raise InputError(
+                "The gaits of a motion must begin at rising frames from 0 on."
+            )
+        if not (np.isfinite(self.fps) and self.fps > 0):
+            raise InputError(f"A motion needs a rate above 0 frames/s, not {self.fps}.")
+        frames, joints = len(self.base_position), len(self.joint_names)
+        if frames < 1:
+            raise InputError("A motion needs at least one frame.")
+        for name, width in zip(UNITS, (3, 4, joints, 3, 3, joints, 4), strict=True):
+            value = getattr(self, name)
+            if value.shape != (frames, width):
+                raise InputError(
+                    f"The {name} of this motion must have shape {(frames, width)}, "
+                    f"not {value.shape}."
+                )
+            kind = "b" if name == "contacts" else "f"
+            if value.dtype.kind != kind:
+                raise InputError(
+                    f"The {name} of a motion must be "
+                    f"{'bool' if kind == 'b' else 'floating point'}, not {value.dtype}."
+                )
+            if not np.isfinite(value).all():
+                raise InputError(f"The {name} of this motion hold NaN or infinity.")
+        if np.abs(np.linalg.norm(self.base_quaternion, axis=1) - 1).max() > 1e-3:
+            raise InputError(
+                "The base_quaternion of a motion must be unit quaternions."
+            )
 
     def __len__(self) -> int:
         return len(self.base_position)
@@ -162,45 +192,3 @@ def make_motion(
         contacts=contacts,
         provenance=provenance,
     )
-
-
-def _check(motion: Motion) -> None:
-    """Raises InputError unless ``motion`` is valid."""
-    check_name("robot", motion.robot)
-    GaitLabel(motion.source, motion.gait)  # checks the names
-    starts = [start for start, _ in motion.gait_changes]
-    if starts and (starts[0] != 0 or sorted(set(starts)) != starts):
-        raise InputError("The gaits of a motion must begin at rising frames from 0 on.")
-    if not (np.isfinite(motion.fps) and motion.fps > 0):
-        raise InputError(f"A motion needs a rate above 0 frames/s, not {motion.fps}.")
-    frames = len(motion.base_position)
-    joints = len(motion.joint_names)
-    if frames < 1:
-        raise InputError("A motion needs at least one frame.")
-    widths = {
-        "base_position": 3,
-        "base_quaternion": 4,
-        "joint_positions": joints,
-        "base_velocity": 3,
-        "base_angular_velocity": 3,
-        "joint_velocities": joints,
-        "contacts": 4,
-    }
-    for name, width in widths.items():
-        value = getattr(motion, name)
-        if value.shape != (frames, width):
-            raise InputError(
-                f"The {name} of this motion must have shape {(frames, width)}, "
-                f"not {value.shape}."
-            )
-        kind = "b" if name == "contacts" else "f"
-        if value.dtype.kind != kind:
-            raise InputError(
-                f"The {name} of a motion must be "
-                f"{'bool' if kind == 'b' else 'floating point'}, not {value.dtype}."
-            )
-        if not np.isfinite(value).all():
-            raise InputError(f"The {name} of this motion hold NaN or infinity.")
-    norms = np.sqrt((motion.base_quaternion**2).sum(axis=1))
-    if np.abs(norms - 1).max() > 1e-3:
-        raise InputError("The base_quaternion of a motion must be unit quaternions.")

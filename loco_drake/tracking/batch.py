@@ -13,7 +13,7 @@ from loco_drake.control.reward import reward_terms
 from loco_drake.control.state import ORIENTATION, POSITION, has_fallen, split, unit_base
 from loco_drake.models.robots import get_robot
 from loco_drake.tracking.config import EnvironmentConfig
-from loco_drake.tracking.physics import make_worlds
+from loco_drake.tracking.physics import OwnWorld, SharedWorld
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,11 @@ class TrackingBatch:
         self._config = config
         self._robot = get_robot(config.robot)
         config.randomization.check(self._robot, config.plant)
-        self._worlds = make_worlds(config, count)
+        self._worlds: list[SharedWorld] | list[OwnWorld] = (
+            [OwnWorld(config) for _ in range(count)]
+            if config.randomization.changes_physics
+            else [SharedWorld(config)] * count
+        )
         self._domains = [Domain()] * count
         self._lengths = np.array([len(plan) for plan in plans])
         # Samples of all plans concatenated, for one lookup per step.

@@ -7,7 +7,7 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from loco_drake.common.errors import InputError, check_at_least
+from loco_drake.common.errors import InputError, check_at_least, check_bounds
 from loco_drake.common.rotations import quat_multiply, quat_rotate, yaw_quat
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot
@@ -32,10 +32,9 @@ class TerminationConfig:
     def check(self) -> None:
         """Raises InputError unless both are above 0."""
         for name, value in vars(self).items():
-            if not value > 0:
-                raise InputError(
-                    f"The termination's {name} must be above 0, not {value}."
-                )
+            # Infinity never terminates.
+            if value != np.inf:
+                check_bounds(f"The termination's {name}", value, 0, above=True)
 
     def exceeded(self, state: Array, plan_state: Array) -> NDArray[np.bool_]:
         """Returns whether each robot is too far from its plan to come back, (...).
@@ -113,13 +112,10 @@ class EnvironmentConfig:
         self.plant.check()
         self.termination.check()
         check_at_least("episode_steps", self.episode_steps, 1)
-        noise = {f"reset_noise.{k}": v for k, v in vars(self.reset_noise).items()}
-        for name in ("position_penalty", "fall_cost"):
-            noise[name] = getattr(self, name)
-        for name, value in noise.items():
-            if not 0 <= value < np.inf:
-                option = "--" + name.replace("_", "-")
-                raise InputError(f"{option} must be 0 or more, not {value}.")
+        for name, value in vars(self.reset_noise).items():
+            check_bounds(f"--reset-noise.{name}", value, 0)
+        check_bounds("--position-penalty", self.position_penalty, 0)
+        check_bounds("--fall-cost", self.fall_cost, 0)
         self.randomization.check(robot, self.plant)
 
     def known_to(self, *, privileged: bool) -> "EnvironmentConfig":
@@ -180,19 +176,10 @@ class PpoConfig:
             check_at_least(name, getattr(self, name), 1)
         if not self.hidden or min(self.hidden) < 1:
             raise InputError(f"--hidden must be widths above 0, not {self.hidden}.")
-        for name, most in (
-            ("gamma", 1.0),
-            ("gae_lambda", 1.0),
-            ("clip", 1.0),
-            ("actor_rate", 1.0),
-            ("target_kl", np.inf),
-            ("critic_rate", 1.0),
-        ):
-            value = getattr(self, name)
-            if not 0 < value <= most or np.isinf(value):
-                limit = f" and at most {most:g}" if np.isfinite(most) else ""
-                option = "--" + name.replace("_", "-")
-                raise InputError(f"{option} must be above 0{limit}, not {value}.")
+        for name in ("gamma", "gae_lambda", "clip", "actor_rate", "critic_rate"):
+            option = f"--{name.replace('_', '-')}"
+            check_bounds(option, getattr(self, name), 0, 1, above=True)
+        check_bounds("--target-kl", self.target_kl, 0, above=True)
         if not np.isfinite(self.log_std):
             raise InputError(f"--log-std must be a number, not {self.log_std}.")
 

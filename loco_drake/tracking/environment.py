@@ -1,5 +1,7 @@
 """The Gymnasium environment of the tracking task."""
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -9,8 +11,10 @@ from numpy.typing import NDArray
 from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.control.plan import Plan
 from loco_drake.control.reward import REWARD_TERMS
+from loco_drake.models.robots import get_robot
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.references import generate_references, load_references
 
 Observation = NDArray[np.float32]
 
@@ -77,3 +81,33 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
 
     def _start(self) -> dict[str, int]:
         return {"plan": int(self._batch.plan[0]), "sample": int(self._batch.start[0])}
+
+
+def make_tracking(
+    config: EnvironmentConfig | None = None,
+    references: Path | None = None,
+    labels: Sequence[str] = ("dog-pace", "dog-trot"),
+    count: int = 4,
+    seconds: float = 6.0,
+    seed: int = 0,
+) -> TrackingEnv:
+    """Returns the environment of ``gymnasium.make("loco_drake/Tracking-v0")``.
+
+    Args:
+        config: configuration of the environment.
+        references: folder of Motion files to track. If None, the shipped weights
+            generate motion as follows.
+        labels: gaits to generate.
+        count: motions per gait.
+        seconds: length of each motion, s.
+        seed: seed of the generated motion.
+    """
+    config = config or EnvironmentConfig()
+    robot = get_robot(config.robot)
+    if references is not None:
+        plans = load_references(robot, references)
+    else:
+        plans = generate_references(
+            robot, labels, count=count, seconds=seconds, seed=seed
+        )
+    return TrackingEnv(plans, config)

@@ -137,12 +137,3 @@ class OwnWorld(_Simulation):
         self._set(state, desired_state)
         self._sample += 1
         return self._advance(self._sample * PLAN_DT)
-
-
-def make_worlds(
-    config: EnvironmentConfig, count: int
-) -> list[SharedWorld] | list[OwnWorld]:
-    """Returns the simulation of each of ``count`` robots, shared by default."""
-    if config.randomization.changes_physics:
-        return [OwnWorld(config) for _ in range(count)]
-    return [SharedWorld(config)] * count

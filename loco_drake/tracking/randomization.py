@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.common.errors import InputError
+from loco_drake.common.errors import InputError, check_bounds
 from loco_drake.control.domain import BOUNDS, Domain, Push, SensorErrors
 from loco_drake.control.measurement import error_vector
 
@@ -98,10 +98,8 @@ class RandomizationConfig:
                 )
         if robot is not None and self.motor_strength is not None:
             check_strength(robot, plant or PlantConfig(), self.motor_strength[0])
-        if self.noise is not None and not (0 <= self.noise < np.inf):
-            raise InputError(
-                f"The randomization's noise must be 0 or more, not {self.noise:g}."
-            )
+        if self.noise is not None:
+            check_bounds("The randomization's noise", self.noise, 0)
 
     def with_standard(self) -> "RandomizationConfig":
         """Returns a copy in which every part that is off is as in STANDARD."""

@@ -3,7 +3,7 @@
 import json
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -47,19 +47,9 @@ _LAYOUT = [list(part) for part in OBSERVATION_LAYOUT]
 _SCORES = ("scores", "shares", "plan_scores", "plan_shares")
 
 
-@dataclass(frozen=True)
-class Progress:
-    """Progress reported after each batch.
-
-    Attributes:
-        steps: environment steps so far.
-        total: environment steps in all.
-        scores: mean normalized return of recent training episodes by label, 0-100.
-    """
-
-    steps: int
-    total: int
-    scores: dict[str, float]
+# Is told the environment steps so far, and the mean normalized return of recent
+# training episodes by label, 0-100.
+Report = Callable[[int, dict[str, float]], None]
 
 
 def train_tracker(
@@ -70,7 +60,7 @@ def train_tracker(
     resume: bool = False,
     first: Path | None = None,
     options: Mapping[str, Any] | None = None,
-    report: Callable[[Progress], None] = lambda progress: None,
+    report: Report = lambda steps, scores: None,
 ) -> dict[str, Any]:
     """Trains a policy to track ``plans``.
 
@@ -242,7 +232,7 @@ class _Saver(BaseCallback):
         log: Path,
         sampler: PlanSampler,
         config: TrainingConfig,
-        report: Callable[[Progress], None],
+        report: Report,
         stop_requested: Event,
     ) -> None:
         super().__init__()
@@ -283,7 +273,7 @@ class _Saver(BaseCallback):
         with self._log.open("a") as log:
             log.write(json.dumps(line) + "\n")
         self.save(self.model)
-        self._report(Progress(self.num_timesteps, self._config.steps, scores))
+        self._report(self.num_timesteps, scores)
 
     def save(self, learner: AdaptivePPO) -> None:
         """Writes the checkpoint and the policy."""

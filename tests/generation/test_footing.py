@@ -5,6 +5,7 @@ from loco_drake.common.rotations import quat_rotate
 from loco_drake.generation import features as ft
 from loco_drake.generation.footing import start_footing, step_footing
 from loco_drake.models.robots import get_robot
+from tests.generation.paths import integrate_path
 
 GO2 = get_robot("go2")
 ORIGIN = np.zeros((1, 3))
@@ -26,7 +27,7 @@ def slip(q, contacts):
 def test_a_motion_without_slip_is_left_alone(make_synthetic):
     features = ft.motion_features(GO2, make_synthetic("dog-trot", 2.0, 0.8))[None]
     _, q, contacts = step_footing(GO2, start_footing(ORIGIN), features)
-    plain = ft.positions(GO2, features, ft.integrate_path(GO2, features, ORIGIN))
+    plain = ft.positions(GO2, features, integrate_path(GO2, features, ORIGIN))
     np.testing.assert_allclose(q, plain, atol=2e-3)
     assert (contacts == (features[..., ft.CONTACTS] > 0.5)).all()
 
@@ -35,7 +36,7 @@ def test_feet_of_a_motion_that_slips_stand(make_synthetic):
     """A base that is told 1.15 times the speed of its legs slips .12 m/s."""
     features = ft.motion_features(GO2, make_synthetic("dog-trot", 4.0, 0.8))[None]
     features[..., 0] *= 1.15
-    plain = ft.positions(GO2, features, ft.integrate_path(GO2, features, ORIGIN))
+    plain = ft.positions(GO2, features, integrate_path(GO2, features, ORIGIN))
     down = features[0, :, ft.CONTACTS] > 0.5
     assert slip(plain[0], down) == pytest.approx(0.12, abs=0.01)
     _, q, contacts = step_footing(GO2, start_footing(ORIGIN), features)
@@ -49,7 +50,7 @@ def test_the_base_is_drawn_to_its_feet_without_a_jolt(make_synthetic):
     """Its correction changes by at most .15 (.05 * 60 mm + itself) a frame."""
     features = ft.motion_features(GO2, make_synthetic("dog-trot", 4.0, 0.8))[None]
     features[..., 0] *= 1.15
-    plain = ft.positions(GO2, features, ft.integrate_path(GO2, features, ORIGIN))
+    plain = ft.positions(GO2, features, integrate_path(GO2, features, ORIGIN))
     _, q, _ = step_footing(GO2, start_footing(ORIGIN), features)
     correction = np.diff((q - plain)[0, :, 4:6], axis=0)
     assert np.abs(correction).max() > 5e-4
@@ -59,7 +60,7 @@ def test_the_base_is_drawn_to_its_feet_without_a_jolt(make_synthetic):
 def test_no_toe_is_below_the_ground(make_synthetic):
     features = ft.motion_features(GO2, make_synthetic("dog-pace", 2.0, 0.8))[None]
     features[..., ft.HEIGHT] -= 0.03 / GO2.stand_height
-    plain = ft.positions(GO2, features, ft.integrate_path(GO2, features, ORIGIN))
+    plain = ft.positions(GO2, features, integrate_path(GO2, features, ORIGIN))
     assert toes_of(plain)[..., 2].min() < GO2.foot_radius - 0.025
     _, q, _ = step_footing(GO2, start_footing(ORIGIN), features)
     assert toes_of(q)[..., 2].min() > GO2.foot_radius - 1e-9

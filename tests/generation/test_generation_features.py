@@ -4,6 +4,7 @@ import pytest
 from loco_drake.common.errors import InputError
 from loco_drake.generation import features as ft
 from loco_drake.models.robots import get_robot
+from tests.generation.paths import integrate_path
 
 GO2 = get_robot("go2")
 
@@ -20,7 +21,7 @@ def test_round_trip_gives_back_every_pose(make_synthetic, turn):
     motion = make_synthetic("dog-trot", 3.0, 0.8, turn)
     features = ft.motion_features(GO2, motion)
     start = pose_of(motion, 0)
-    path = ft.integrate_path(GO2, features[1:], start)
+    path = integrate_path(GO2, features[1:], start)
     q = ft.positions(GO2, features[1:], path)
     np.testing.assert_allclose(q[:, 4:7], motion.base_position[1:], atol=1e-12)
     np.testing.assert_allclose(q[:, 7:], motion.joint_positions[1:], atol=0)
@@ -61,9 +62,9 @@ def test_velocity_and_yaw_rate_of_an_arc(make_synthetic):
 def test_integration_goes_on_where_it_stopped(make_synthetic):
     features = ft.motion_features(GO2, make_synthetic("dog-trot", 2.0, 0.8, 1.0))
     start = np.array([1.0, 2.0, 0.3])
-    whole = ft.integrate_path(GO2, features, start)
-    first = ft.integrate_path(GO2, features[:37], start)
-    second = ft.integrate_path(GO2, features[37:], first[-1])
+    whole = integrate_path(GO2, features, start)
+    first = integrate_path(GO2, features[:37], start)
+    second = integrate_path(GO2, features[37:], first[-1])
     np.testing.assert_allclose(np.concatenate((first, second)), whole, atol=1e-12)
 
 
@@ -76,7 +77,7 @@ def test_toes_in_torch_agree_with_numpy_kinematics(make_synthetic):
     import torch
 
     from loco_drake.common.rotations import quat_rotate
-    from loco_drake.generation.toes import Toes
+    from loco_drake.generation.tokenizer_score import Toes
 
     motion = make_synthetic("dog-pace", 1.0, 0.7, 0.0)
     features = ft.motion_features(GO2, motion)
@@ -94,7 +95,7 @@ def test_toe_speeds_of_standing_feet_are_zero(make_synthetic):
     """The made motion has no slip: its feet in contact stand still over the ground."""
     import torch
 
-    from loco_drake.generation.toes import Toes
+    from loco_drake.generation.tokenizer_score import Toes
 
     motion = make_synthetic("dog-trot", 2.0, 0.8, 0.0)
     features = ft.motion_features(GO2, motion)

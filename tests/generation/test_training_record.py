@@ -5,7 +5,7 @@ from loco_drake.cli.train_generator import TrainGenerator
 from loco_drake.cli.train_tokenizer import TrainTokenizer
 from loco_drake.evaluation.recorded import by_split
 from loco_drake.generation.tokenizer import load_tokenizer, save_tokenizer
-from loco_drake.generation.training_record import (
+from loco_drake.generation.training_motions import (
     read_training_record,
     seen_in_training,
 )

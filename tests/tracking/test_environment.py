@@ -18,9 +18,8 @@ from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
 from loco_drake.systems.simulator import MakeSimulator, StartEpisode
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.config import EnvironmentConfig, ResetNoise, TerminationConfig
-from loco_drake.tracking.environment import TrackingEnv
+from loco_drake.tracking.environment import TrackingEnv, make_tracking
 from loco_drake.tracking.references import load_references
-from loco_drake.tracking.registration import make_tracking
 from tests.synthetic_motion import synthetic_motion
 
 ANYWHERE = TerminationConfig(position=1e3, rotation=1e3)  # but fallen

@@ -44,8 +44,8 @@ def trained(plans, tmp_path_factory):
     """Two batches, then Ctrl-C in the third, then two more."""
     folder = tmp_path_factory.mktemp("tracker")
 
-    def interrupt(progress):
-        if progress.steps >= 128:
+    def interrupt(steps, scores):
+        if steps >= 128:
             signal.raise_signal(signal.SIGINT)
 
     first = train_tracker(plans, config(256), folder, report=interrupt)
