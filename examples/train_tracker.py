@@ -12,13 +12,9 @@ from pathlib import Path
 
 import tyro
 
-from loco_drake.control.plan import plan_from_motion
-from loco_drake.control.retiming import path_limits, smooth_plan
-from loco_drake.generation.generate import generate_motions
-from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import get_robot
-from loco_drake.motion.gaits import parse_label
 from loco_drake.tracking.config import PpoConfig, TrainingConfig
+from loco_drake.tracking.references import generate_references
 from loco_drake.tracking.train import train_tracker
 
 
@@ -41,16 +37,8 @@ def train(
         out: folder for the policy, the checkpoint and the logs.
     """
     robot = get_robot("go2")
-    model = pretrained_motion_model(robot.name)
-    motions = [
-        motion
-        for gait in ("dog-pace", "dog-trot")
-        for motion in generate_motions(
-            model, parse_label(gait), seconds, range(references)
-        )
-    ]
-    limits = path_limits(robot)
-    plans = [smooth_plan(robot, plan_from_motion(robot, m), limits) for m in motions]
+    gaits = ("dog-pace", "dog-trot")
+    plans = generate_references(robot, gaits, count=references, seconds=seconds, seed=0)
     print(f"{len(plans)} references of {seconds:g} s")
 
     config = TrainingConfig(

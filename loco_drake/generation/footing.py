@@ -64,20 +64,14 @@ def step_footing(
         Footing after the last frame; q as in :func:`features.positions`, shape
         (B, T, 19); contacts, shape (B, T, 4).
     """
-    frames = features.shape[1]
-    pose, shift, anchor, offset, down = (
-        footing.pose,
-        footing.shift,
-        footing.anchor,
-        footing.offset,
-        footing.contacts,
-    )
+    pose, shift, anchor = footing.pose, footing.shift, footing.anchor
+    offset, down = footing.offset, footing.contacts
     p_HF = _toes(robot, features)
     turn = features[..., ft.YAW_RATE][..., 0] / FPS
     step_H = features[..., ft.VELOCITY] * robot.stand_height / FPS
     likely = features[..., ft.CONTACTS]
     poses, offsets, contacts = [], [], []
-    for k in range(frames):
+    for k in range(features.shape[1]):
         yaw = pose[:, 2] + turn[:, k]
         xy = pose[:, :2] + rotate_plane(step_H[:, k], pose[:, 2] + turn[:, k] / 2)
         toes = xy[:, None] + rotate_plane(p_HF[:, k, :, :2], yaw[:, None])
@@ -93,14 +87,13 @@ def step_footing(
         wish = BASE_GAIN * (held * weight).sum(axis=1)
         shift = shift + BASE_EASE * (wish - shift)
         xy, toes = xy + shift, toes + shift[:, None]
-        faded = SWING_DECAY * offset
         level = offset[..., 2] + SETTLING * (
             robot.foot_radius - p_HF[:, k, :, 2] - offset[..., 2]
         )
         offset = np.where(
             down[..., None],
             np.concatenate((held - shift[:, None], level[..., None]), axis=-1),
-            faded,
+            SWING_DECAY * offset,
         )
         anchor = np.where(down[..., None], toes + offset[..., :2], anchor)
         pose = np.concatenate((xy, yaw[:, None]), axis=-1)

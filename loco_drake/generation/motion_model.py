@@ -90,9 +90,7 @@ class Frames:
 
     def __getitem__(self, index: int) -> "Frames":
         """Returns the frames of one motion, without the first axis."""
-        return Frames(
-            self.q[index], self.v[index], self.contacts[index], self.labels[index]
-        )
+        return Frames(**{name: value[index] for name, value in vars(self).items()})
 
 
 class MotionModel:

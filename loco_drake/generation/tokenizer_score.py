@@ -114,8 +114,8 @@ def score_tokenizer(
     for clip in clips:
         target = clip_tensor(tokenizer, clip)
         robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
+        codes = encode_clip(tokenizer, clip)[None, :, :codebooks]
         with torch.inference_mode(), single_thread():
-            codes = tokenizer.encode(target, robot)[..., :codebooks]
             output = tokenizer.decode(codes, robot)
             apart = toes.positions(output, robot) - toes.positions(target, robot)
         joints.append((output - target)[..., JOINTS].square().flatten())
@@ -131,10 +131,7 @@ def code_counts(tokenizer: Tokenizer, clips: Sequence[Clip]) -> Tensor:
     config = tokenizer.config
     counts = torch.zeros(config.codebooks, config.codebook_size, dtype=torch.long)
     for clip in clips:
-        robot = torch.tensor([config.robots.index(clip.robot)])
-        with torch.inference_mode(), single_thread():
-            codes = tokenizer.encode(clip_tensor(tokenizer, clip), robot)[0]
-        for codebook, used in enumerate(codes.T):
+        for codebook, used in enumerate(encode_clip(tokenizer, clip).T):
             counts[codebook] += torch.bincount(used, minlength=config.codebook_size)
     return counts
 
@@ -144,8 +141,14 @@ def codebook_use(tokenizer: Tokenizer, clips: Sequence[Clip]) -> float:
     return float((code_counts(tokenizer, clips) > 0).float().mean())
 
 
-def clip_tensor(tokenizer: Tokenizer, clip: Clip, start: int = 0) -> Tensor:
-    """Returns a clip's features from ``start`` on, in whole tokens, (1, T, SIZE)."""
-    tokens = (len(clip) - start) // tokenizer.config.frames_per_token
-    end = start + tokens * tokenizer.config.frames_per_token
-    return torch.tensor(clip.features[None, start:end], dtype=torch.float32)
+def encode_clip(tokenizer: Tokenizer, clip: Clip) -> Tensor:
+    """Returns the codes of a clip's whole tokens, shape (n, codebooks)."""
+    robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
+    with torch.inference_mode(), single_thread():
+        return tokenizer.encode(clip_tensor(tokenizer, clip), robot)[0]
+
+
+def clip_tensor(tokenizer: Tokenizer, clip: Clip) -> Tensor:
+    """Returns the features of a clip's whole tokens, shape (1, T, SIZE)."""
+    end = len(clip) - len(clip) % tokenizer.config.frames_per_token
+    return torch.tensor(clip.features[None, :end], dtype=torch.float32)

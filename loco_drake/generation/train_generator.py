@@ -23,7 +23,7 @@ from loco_drake.generation.generator import (
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.stitching import Stitcher
 from loco_drake.generation.tokenizer import Tokenizer
-from loco_drake.generation.tokenizer_score import clip_tensor
+from loco_drake.generation.tokenizer_score import encode_clip
 from loco_drake.generation.training import LoopResult, train
 from loco_drake.generation.training_motions import Clip, Library, training_record
 from loco_drake.motion.gaits import GaitLabel
@@ -63,13 +63,11 @@ def encode_clips(
     """Returns the tokens of each clip, the first ``codebooks`` codes of each."""
     encoded = []
     for clip in clips:
-        robot = torch.tensor([tokenizer.config.robots.index(clip.robot)])
-        with torch.inference_mode(), single_thread():
-            codes = tokenizer.encode(clip_tensor(tokenizer, clip), robot)
+        codes = encode_clip(tokenizer, clip)[:, :codebooks].numpy()
         speeds = speed_rank.token_speeds(
             clip.features, tokenizer.config.frames_per_token
         )
-        encoded.append(Codes(clip.label.index, codes[0, :, :codebooks].numpy(), speeds))
+        encoded.append(Codes(clip.label.index, codes, speeds))
     return encoded
 
 

@@ -47,8 +47,9 @@ class PlanSampler:
         scores, shares = self.scores[self.present], self.shares[self.present]
         label = self._choose(self.present, scores, shares, _MOST)
         plans = np.flatnonzero(self._labels == label)
-        scores = _filled(self.plan_scores[plans], self.scores[label])
-        shares = _filled(self.plan_shares[plans], self.shares[label])
+        undrawn = np.isnan(self.plan_scores[plans])
+        scores = np.where(undrawn, self.scores[label], self.plan_scores[plans])
+        shares = np.where(undrawn, self.shares[label], self.plan_shares[plans])
         return self._choose(plans, scores, shares, _MOST_OF_PLAN)
 
     def _choose(
@@ -87,7 +88,3 @@ class PlanSampler:
             str(ROW_LABELS[i]): 100 * float(own.mean()) if len(own) else 0.0
             for i, own in scores.items()
         }
-
-
-def _filled(values: NDArray[np.float64], value: float) -> NDArray[np.float64]:
-    return np.where(np.isnan(values), value, values)
