@@ -46,7 +46,7 @@ from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.config import EnvironmentConfig, PpoConfig, TrainingConfig
 from loco_drake.tracking.randomization import STANDARD, RandomizationConfig
 from loco_drake.tracking.sampler import PlanSampler
-from loco_drake.tracking.train import Progress, train_tracker
+from loco_drake.tracking.train import train_tracker
 from loco_drake.tracking.workers import WorkerVecEnv
 
 ROBOT = "go2"
@@ -206,7 +206,7 @@ def memory(
         command = ["ps", "-o", "rss=", "-p", str(pid)]
         return int(subprocess.check_output(command, text=True)) / 1024
 
-    def report(progress: Progress) -> None:
+    def report(steps: int, scores: dict[str, float]) -> None:
         workers = sorted(child.pid or 0 for child in multiprocessing.active_children())
         named = {"trainer": os.getpid()}
         named |= {f"worker_{k}": pid for k, pid in enumerate(workers)}
