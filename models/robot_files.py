@@ -241,7 +241,7 @@ def _check_trunk(trunk: str, toes: Array, hips: Array) -> None:
                 f"The axes of trunk {trunk} must be x forward, y left, z up, but by "
                 f"the feet of the stance forward is {x}, left {y} and up {z}: name a "
                 f'frame of the URDF such as <frame name="trunk" link="{trunk}" '
-                f'rpy="{rpy}"/>, or mend the names of the legs.'
+                f'rpy="{rpy}"/>, or correct the names of the legs.'
             )
         if R[2, 2] < _ALONG:
             raise InputError(

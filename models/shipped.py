@@ -52,6 +52,6 @@ def policy_path(robot: Robot, policy: Path | None = None) -> Path:
         raise InputError(
             f"There are no policy weights at {str(policy)!r}, and no shipped policy of "
             f"{robot.name} has that name; "
-            + (f"there are {names}." if names else "there is but the main one.")
+            + (f"there are {names}." if names else "there is only the main one.")
         )
     return variants[str(policy)]

@@ -149,7 +149,7 @@ def read_legs(
 
 def _read_xml(path: Path) -> ET.Element:
     if path.stat().st_size > _MAX_BYTES:
-        raise InputError(f"{path} is no URDF: it has more than 20 MB.")
+        raise InputError(f"{path} is not a URDF: it has more than 20 MB.")
     try:
         root = ET.parse(path).getroot()
     except (ET.ParseError, ValueError, LookupError, RecursionError) as error:
@@ -185,7 +185,7 @@ def _read_limits(joint: ET.Element) -> tuple[float, float, float]:
             float(limits[key]) for key in ("lower", "upper", "velocity")
         )
     except ValueError:
-        raise InputError(f"The limits of joint {name} are no numbers.") from None
+        raise InputError(f"The limits of joint {name} are not numbers.") from None
     if kind == "continuous":
         lower, upper = -np.inf, np.inf
     if not (lower <= upper and speed >= 0):

@@ -199,10 +199,14 @@ def _read(path: Path) -> str:
         if not path.is_file():
             raise InputError(f"There is no scenario file {str(path)!r}.")
         if path.stat().st_size > _MAX_SIZE:
-            raise InputError(f"{path} has more than {_MAX_SIZE} B, and is no scenario.")
+            raise InputError(
+                f"{path} has more than {_MAX_SIZE} B and is not a scenario."
+            )
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(f"{path} is no scenario: it is not text in UTF-8.") from None
+        raise InputError(
+            f"{path} is not a scenario: it is not text in UTF-8."
+        ) from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
 

@@ -106,7 +106,7 @@ def MakeSimulator(diagram: Diagram, scenario: Scenario) -> LocomotionSimulator:
         if continuous and part is not diagram:
             raise InputError(
                 "CENIC finds a plant only among the root diagram's own systems: add "
-                "the locomotion to your builder with AddLocomotion, or take contact "
+                "the locomotion to your builder with AddLocomotion, or use contact "
                 "similar, lagged or sap."
             )
     simulator = LocomotionSimulator(diagram)

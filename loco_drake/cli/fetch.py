@@ -82,7 +82,7 @@ class DataFetch:
             raise InputError(f"{str(folder)!r} is a file, not a folder for recordings.")
         table = folder / "segments.csv"
         if table.is_symlink():
-            raise InputError(f"{str(table)!r} is a link, and would not be written to.")
+            raise InputError(f"{str(table)!r} is a link, which is not written to.")
         rows = read_rows(table) if table.exists() else []
         missing = {
             source: [file for file in listed if not file.is_present(folder)]

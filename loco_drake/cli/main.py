@@ -88,8 +88,8 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         library = str(error).split(":")[0]
         print(
-            f"loco-drake: This system lacks {library}; on Debian or Ubuntu, mend that "
-            f"by: apt-get install {_LIBRARIES}.",
+            f"loco-drake: This system lacks {library}; on Debian or Ubuntu, "
+            f"install it with: apt-get install {_LIBRARIES}.",
             file=sys.stderr,
         )
         return 1
@@ -128,7 +128,7 @@ def _split(arguments: list[str], members: list[str]) -> tuple[str, list[str]]:
     """
     words = 2 if members else 1
     if len(arguments) < words:
-        raise InputError(f"Say which: {', '.join(members)}.")
+        raise InputError(f"Name a subcommand: {', '.join(members)}.")
     name = " ".join(arguments[:words])
     check_choice("command", name, members or _COMMANDS)
     return name, arguments[words:]

@@ -162,7 +162,7 @@ def read_json(path: Path) -> dict[str, Any]:
         return parse_json(path.read_bytes().decode("utf-8-sig"))
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise InputError(f"{path} is damaged: it is no JSON ({reason}).") from None
+        raise InputError(f"{path} is damaged: it is not JSON ({reason}).") from None
 
 
 def read_text(path: Path) -> str:

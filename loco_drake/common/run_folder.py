@@ -156,7 +156,7 @@ def check_folder(folder: Path, weights: str, resume: bool) -> None:
         )
     if found and not resume:
         raise InputError(
-            f"{str(folder)!r} holds a run already ({', '.join(found)}); go on with it "
+            f"{str(folder)!r} holds a run already ({', '.join(found)}); resume it "
             "with --resume, or name another folder with --out."
         )
 
@@ -322,7 +322,7 @@ def sound(path: Path) -> Iterator[None]:
         raise
     except (AttributeError, LookupError, TypeError, ValueError, RuntimeError):
         raise InputError(
-            f"{path} is damaged, or does not fit the network that it is of."
+            f"{path} is damaged, or does not fit the network of this run."
         ) from None
 
 

@@ -106,7 +106,7 @@ def load_weights(
         )
     header = {"format_version": version, "kind": found, "config": config}
     if claimed not in (None, _content_sha256(header, tensors)):
-        raise InputError(f"{path} is damaged: it was written with other content.")
+        raise InputError(f"{path} is damaged: its content does not match its hash.")
     for name, value in tensors.items():
         finite = not value.is_floating_point() or value.float().isfinite().all()
         if not finite and name not in may_be_nan:

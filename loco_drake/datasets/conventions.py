@@ -115,7 +115,7 @@ def _turn_up(points: Array, notes: dict[str, str]) -> Array:
         if cosines[2] > ASKEW:
             return points
         raise InputError(
-            "which way is up cannot be told, since along no axis is the trunk above "
+            "the up axis is unclear, since along no axis is the trunk above "
             "the toes (are the columns those of the format?)."
         )
     if axis == 2 and cosines[2] > 0:

@@ -94,7 +94,7 @@ def read_horse(
         rate = check_told(told, rate)
     if rate is None:
         raise InputError(
-            "it does not tell its rate: its name has no day of measurement (_M1_, _M2_ "
+            "it has no known rate: its name has no day of measurement (_M1_, _M2_ "
             "or _M3_) and its strides are too few, or not those of a horse; give its "
             "frames per second with --fps 60 or --fps 120."
         )
@@ -120,7 +120,7 @@ def _read_raw(path: Path) -> tuple[Array, float]:
     if not rate or not regular.all():
         line = int(np.argmin(regular)) + 2
         raise InputError(
-            f"at line {line} the time does not go on evenly (are lines missing or out "
+            f"at line {line} the time steps are uneven (are lines missing or out "
             "of order?)."
         )
     points = table[:, 1:].reshape(-1, len(MARKERS), 3)[:, 1:] / 1000

@@ -91,7 +91,7 @@ def _infer_rate(feet: Array, fps: float | None) -> float:
         if len(feet) == round(rate * RUN_SECONDS):
             return rate
     raise InputError(
-        "it does not tell its rate, since no foot swings in it as this controller has "
+        "it has no known rate, since no foot swings in it as this controller has "
         "it; give its frames per second with --fps 100 or --fps 200."
     )
 

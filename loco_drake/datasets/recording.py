@@ -80,8 +80,8 @@ def check_told(told: float, fps: float | None) -> float:
     """
     if fps is not None and not 0.75 < fps / told < 4 / 3:
         raise InputError(
-            f"at {fps:g} frames/s it is none, as its motion tells that it has "
-            f"{told:g}; leave the rate away, or correct it."
+            f"at {fps:g} frames/s it is none, as its motion implies "
+            f"{told:g}; omit the rate or correct it."
         )
     return told if fps is None else fps
 

@@ -114,7 +114,7 @@ for _entry in entry_points(group=ENTRY_POINTS):
         register_dataset(_entry.load())
     except Exception as error:
         raise InputError(
-            f"The installed dataset {_entry.name!r} cannot be taken: "
+            f"The installed dataset {_entry.name!r} cannot be registered: "
             f"{type(error).__name__}: {error}"
         ) from error
 

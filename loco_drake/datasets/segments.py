@@ -42,7 +42,9 @@ class Segment:
     def __post_init__(self) -> None:
         GaitLabel(self.source, self.gait)  # checks the names
         if not 0 <= self.start < self.end:
-            raise InputError(f"Frames {self.start} to {self.end} are no stretch.")
+            raise InputError(
+                f"Frames {self.start} to {self.end} are not a valid stretch."
+            )
         check_rate(self.fps)
 
     @property
@@ -212,7 +214,7 @@ def read_segments(data_dir: Path) -> list[Segment]:
                 fps=float(row["fps"]),
             )
         except InputError as error:
-            raise InputError(f"{table}: line {line} cannot be: {error}") from None
+            raise InputError(f"{table}: line {line} is invalid: {error}") from None
         except ValueError:
             raise InputError(
                 f"{table}: line {line} has frames or a rate that are not numbers."

@@ -39,7 +39,7 @@ class GaitSchedule:
         """Raises InputError if a gait starts only after ``duration`` s."""
         if self.starts[-1] >= duration:
             raise InputError(
-                f"{self.labels[-1]} is to begin at {self.starts[-1]:g} s, but changes "
+                f"{self.labels[-1]} starts at {self.starts[-1]:g} s, but changes "
                 f"of gait must come before the end, at {duration:g} s."
             )
 

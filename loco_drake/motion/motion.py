@@ -77,7 +77,7 @@ class Motion:
         starts = [start for start, _ in self.gait_changes]
         if starts and (starts[0] != 0 or sorted(set(starts)) != starts):
             raise InputError(
-                "The gaits of a motion must begin at rising frames from 0 on."
+                "The gaits of a motion must start at ascending frames from 0."
             )
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise InputError(f"A motion needs a rate above 0 frames/s, not {self.fps}.")

@@ -67,7 +67,7 @@ def load_motion(path: Path) -> Motion:
         claimed = header.pop("content_sha256", None)
         motion = _make(header, arrays)
         if claimed not in (None, _content_sha256(header, arrays)):
-            raise InputError("It is damaged: it was written with other content.")
+            raise InputError("It is damaged: its content does not match its hash.")
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused
             check_conventions(ordered := in_robot_order(motion))
     except InputError as error:

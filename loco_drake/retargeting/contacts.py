@@ -85,7 +85,7 @@ def stance_height(clip: KeypointClip, config: RetargetConfig) -> float:
     if lowest <= 0:
         raise InputError(
             f"The middle of withers and hip lies {lowest:.3g} m over the ground, "
-            "so this is no clip of an animal on its feet."
+            "so the animal does not stand on its feet."
         )
     if config.stance_height is not None:
         return config.stance_height

@@ -76,9 +76,9 @@ DURATION = "The duration must be above 0"
 # Arguments, in which FILES/ stands for the folder above, and what is said of them.
 WRONG = {
     "fly": "Unknown command 'fly'; the choices are simulate, generate, .*train tracker",
-    "train": "Say which: train tokenizer, train generator, train tracker",
+    "train": "Name a subcommand: train tokenizer, train generator, train tracker",
     "train fly": "'train fly'; the choices are train tokenizer, train generator",
-    "data": "Say which: data list, data fetch, data inspect",
+    "data": "Name a subcommand: data list, data fetch, data inspect",
     "simulate --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
     "simulate --gait dog-fly": f"Unknown gait 'dog-fly'; the choices are {GAITS}",
     "simulate --gait dog-pace,dog-trot": "the time in s at which it begins",
@@ -168,7 +168,7 @@ WRONG = {
     "train tracker --references FILES/empty": r"no Motion files \(\*.npz\)",
     "report --results FILES/none": "There is no folder of results .*generation.json",
     "report --results FILES/empty": "no results in .*one or more of retargeting.json",
-    "report --results FILES/results": "tokenizer.json is damaged: it is no JSON",
+    "report --results FILES/results": "tokenizer.json is damaged: it is not JSON",
     "report --replays dog-fly": f"Unknown gait 'dog-fly'; the choices are {GAITS}",
     "report --replays none dog-trot": "none, or gait labels, not both",
     "report --replay-seconds 0": DURATION,

@@ -241,7 +241,7 @@ def test_rate_given_by_hand_is_taken_unless_the_strides_contradict_it(tmp_path):
     assert command(file, *options, "--fps", 100).run() == 0
     motion = load_motion(tmp_path / f"horse-trot-{file.stem}-0-720.npz")
     assert len(motion) == pytest.approx(360, abs=1)
-    with pytest.raises(InputError, match="motion tells that it has 120"):
+    with pytest.raises(InputError, match="motion implies 120"):
         command(file, *options, "--fps", 60).run()
     with pytest.raises(InputError, match="--fps need a FILE"):
         command("--fps", 60, "--out", tmp_path).run()

@@ -55,8 +55,8 @@ def test_a_missing_system_library_is_one_sentence_that_says_how_to_get_it(tmp_pa
     assert process.returncode == 1
     command = "apt-get install libx11-6 libsm6 libglib2.0-0"
     assert process.stderr == (
-        "loco-drake: This system lacks libX11.so.6; on Debian or Ubuntu, mend that by: "
-        f"{command}.\n"
+        "loco-drake: This system lacks libX11.so.6; on Debian or Ubuntu, install it "
+        f"with: {command}.\n"
     )
     readme = (Path(__file__).parents[2] / "README.md").read_text()
     assert command.split()[2:] == next(

@@ -151,7 +151,7 @@ def test_names_of_columns_tell_their_order(tmp_path):
     ("old", "new", "reason"),
     [
         ("HHLX", "HHL", "header lacks HHLX"),
-        ("\n3,0.033", "\n3,0.055", "line 4 the time does not go on evenly"),
+        ("\n3,0.033", "\n3,0.055", "line 4 the time steps are uneven"),
         ("\n3,0.033", "\n3,", "time column is incomplete"),
         ("\n3,0.033", "\n3,0.033,0.033", "line 4 has 24 columns"),
         ("\n3,0.033", "\n3,soon", "line 4 holds something that is not a number"),

@@ -49,5 +49,5 @@ def test_what_is_no_schedule_is_refused_by_name(text, message):
 
 
 def test_changes_after_the_end_are_refused():
-    with pytest.raises(InputError, match=r"dog-trot is to begin at 9 s.* at 9 s"):
+    with pytest.raises(InputError, match=r"dog-trot starts at 9 s.* at 9 s"):
         parse_schedule("dog-pace,dog-trot@9").check_ends_by(9.0)

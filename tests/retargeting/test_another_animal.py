@@ -100,7 +100,7 @@ def test_installed_dataset_that_breaks_is_named(package):
     listing = run(package, "data", "list")
     assert listing.returncode == 2
     (sentence,) = listing.stderr.splitlines()
-    assert "installed dataset 'elephant' cannot be taken: KeyError" in sentence
+    assert "installed dataset 'elephant' cannot be registered: KeyError" in sentence
 
 
 @pytest.fixture

@@ -218,7 +218,7 @@ def test_what_cannot_be_simulated_is_refused_with_what_can():
     scenario = replace(PLAYED, plant=PlantConfig(contact="cenic"))
     builder = DiagramBuilder()
     builder.AddSystem(MakeLocomotionDiagram(scenario))
-    with pytest.raises(InputError, match=r"AddLocomotion, or take contact similar"):
+    with pytest.raises(InputError, match=r"AddLocomotion, or use contact similar"):
         MakeSimulator(builder.Build(), scenario)
     builder = DiagramBuilder()
     builder.AddSystem(Odometer())

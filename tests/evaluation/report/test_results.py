@@ -54,8 +54,8 @@ def test_results_of_another_robot_are_not_taken_for_those_of_the_file(tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("{", "it is no JSON"),
-        ("[1, 2]", r"it is no JSON \(not an object\)"),
+        ("{", "it is not JSON"),
+        ("[1, 2]", r"it is not JSON \(not an object\)"),
         ('{"robot": "spot"}', "it says of no robot; the choices are go2, a1"),
         ('{"robots": {"go2": 3}}', "it has no robots.go2|it has no go2"),
         ('{"robots": {"go2": {"labels": {}}}}', "it has no all"),
@@ -65,7 +65,7 @@ def test_results_of_another_robot_are_not_taken_for_those_of_the_file(tmp_path):
         ),
         (
             '{"robots": {"go2": {"labels": {}, "all": {"joint_rmse_rad": NaN}}}}',
-            "it is no JSON",
+            "it is not JSON",
         ),
         (
             '{"robots": {"go2": {"labels": {}, "all": {}}}}',
