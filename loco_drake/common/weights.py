@@ -1,7 +1,7 @@
 """Network weights as safetensors files with a descriptive header."""
 
 import json
-import math
+import sys
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -176,7 +176,7 @@ def _is(hint: Any, value: Any) -> bool:
     if hint is int:
         return type(value) is int and 1 <= value <= MAX_SIZE
     if hint is float:
-        return type(value) in (int, float) and math.isfinite(value)
+        return type(value) in (int, float) and abs(value) <= sys.float_info.max
     return hint is Any or isinstance(value, hint)
 
 

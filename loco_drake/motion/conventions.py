@@ -39,6 +39,7 @@ MAX_UNKNOWN_JOINT_SPEED = 200.0  # rad/s, for a robot with unknown limits
 
 _DOUBT = 0.2  # of what is rounding
 _TINY = 1e-9
+_MOST_LATE = 10  # frames that velocities may be found to lag; up to 2 are a filter's
 
 
 def in_robot_order(motion: Motion) -> Motion:
@@ -185,7 +186,12 @@ def _check_velocities(motion: Motion) -> None:
     ):
         given = getattr(motion, name)[1:-1]
         off, speed = _rms(given - true), _rms(true)
-        others["all zero"] = np.zeros_like(true)
+        others |= {"all zero": np.zeros_like(true), "in reverse": true[::-1]}
+        for late in (k for k in range(-_MOST_LATE, _MOST_LATE + 1) if abs(k) > 2):
+            moved = np.roll(true, late, axis=0)
+            ends = slice(late) if late > 0 else slice(late, None)
+            moved[ends] = given[ends]  # of which nothing is known
+            others[f"{late} frames late"] = moved
         best = min(others, key=lambda how: _rms(given - others[how]))
         found = _rms(given - others[best]) < off / 4
         far = np.abs(given - true).max() > 0.5 * np.abs(true).max() + 5 * rounding
