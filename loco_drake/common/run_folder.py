@@ -320,7 +320,14 @@ def sound(path: Path) -> Iterator[None]:
         yield
     except InputError:
         raise
-    except (AttributeError, LookupError, TypeError, ValueError, RuntimeError):
+    except (
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        TypeError,
+        ValueError,
+        RuntimeError,
+    ):
         raise InputError(
             f"{path} is damaged, or does not fit the network of this run."
         ) from None

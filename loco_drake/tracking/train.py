@@ -201,7 +201,7 @@ def _start_from(learner: AdaptivePPO, saved: Checkpoint) -> None:
         statistics = learner.statistics
         statistics.mean = saved.tensors["normalizer/mean"].numpy()
         statistics.var = saved.tensors["normalizer/variance"].numpy()
-        statistics.count = saved.state["normalizer_count"]
+        statistics.count = float(saved.state["normalizer_count"])
 
 
 def _restore(learner: AdaptivePPO, sampler: PlanSampler, saved: Checkpoint) -> None:
@@ -220,7 +220,7 @@ def _restore(learner: AdaptivePPO, sampler: PlanSampler, saved: Checkpoint) -> N
         keys = saved.tensors["random/numpy"].numpy().astype(np.uint32)
         np.random.set_state(("MT19937", keys, position, has_gauss, gauss))  # noqa: NPY002
         learner.num_timesteps = saved.state["steps"]
-        learner.rate = saved.state["learning_rate"]
+        learner.rate = float(saved.state["learning_rate"])
 
 
 class _Saver(BaseCallback):

@@ -94,7 +94,11 @@ class Worker:
         if self._process is not None:
             assert self._process.stdin is not None
             self._process.stdin.close()
-            self._process.wait(30)
+            try:
+                self._process.wait(30)
+            except subprocess.TimeoutExpired:  # it has no work to lose
+                self._process.kill()
+                self._process.wait()
             assert self._process.stdout is not None
             self._process.stdout.close()
             self._process = None
