@@ -139,7 +139,7 @@ def test_legs_that_are_not_where_their_names_say_are_named(tmp_path, names, reas
 def test_all_legs_misnamed_or_a_trunk_turned_round_is_either(tmp_path):
     """Front left called rear right, and so on: turning the trunk would mend it too."""
     with pytest.raises(
-        InputError, match=r"forward is -x, left -y .* or mend the names"
+        InputError, match=r"forward is -x, left -y .* or correct the names"
     ):
         load(tmp_path, made_up_urdf(), names=("RR", "RL", "FR", "FL"))
 
@@ -185,7 +185,10 @@ CALF = '<link name="FL_calf"/><joint name="FL_calf_joint" type="revolute">'
             spoil('upper="1"', 'upper="-2"'),
             "FL_hip_joint contradict each other: lower -1",
         ),
-        (spoil('upper="1"', 'upper="one"'), "limits of joint FL_hip_joint are no numb"),
+        (
+            spoil('upper="1"', 'upper="one"'),
+            "limits of joint FL_hip_joint are not numb",
+        ),
         (spoil('velocity="20"', 'velocity="-1"'), "contradict each other"),
         (spoil('velocity="20"', 'velocity="nan"'), "contradict each other"),
         (spoil('velocity="20"', 'velocity="0"'), "move at 0 rad/s; give its leg's spe"),

@@ -115,7 +115,7 @@ def test_stance_height_is_the_percentile_of_the_middle_or_that_of_the_source():
     assert stance_height(clip, RetargetConfig()) == pytest.approx(0.625)
     assert stance_height(clip, RetargetConfig(stance_height=0.3)) == 0.3
     sunk = clip_of([[0, 0, -1]], [[-1, 0, 0.3]], np.zeros((1, 4, 3)))
-    with pytest.raises(InputError, match="no clip of an animal on its feet"):
+    with pytest.raises(InputError, match="does not stand on its feet"):
         stance_height(sunk, RetargetConfig(stance_height=0.3))
 
 
