@@ -6,7 +6,14 @@ from tests.fuzzing.kinds import KINDS
 from tests.fuzzing.run import Fuzzer
 
 # What takes a training, or seconds of CPU time for each input.
-SLOW = {"results": 2, "tracker": 2, "start from": 2, "trained on": 5, "of a token": 5}
+SLOW = {
+    "results": 2,
+    "tracker": 2,
+    "start from": 2,
+    "trained on": 5,
+    "of a token": 5,
+    "scenario": 4,
+}
 
 
 def cases():
