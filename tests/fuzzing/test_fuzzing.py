@@ -5,8 +5,10 @@ import pytest
 from tests.fuzzing.kinds import KINDS
 from tests.fuzzing.run import Fuzzer
 
-# What takes a training, or seconds of CPU time for each input.
-SLOW = {
+pytestmark = pytest.mark.slow
+
+# How many inputs, where each takes a training or seconds; 8 of the others.
+FEW = {
     "results": 2,
     "tracker": 2,
     "start from": 2,
@@ -18,9 +20,8 @@ SLOW = {
 
 def cases():
     for name in KINDS:
-        slow = next((part for part in SLOW if part in name), None)
-        marks = pytest.mark.slow if slow else ()
-        yield pytest.param(name, SLOW.get(slow, 8), marks=marks, id=name)
+        part = next((part for part in FEW if part in name), None)
+        yield pytest.param(name, FEW.get(part, 8), id=name)
 
 
 @pytest.fixture(scope="module")
