@@ -22,7 +22,7 @@ from loco_drake.generation.generate import generate_motion
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
-from loco_drake.systems.plan_player import PlanPlayer
+from loco_drake.systems.control import PlanPlayer
 from loco_drake.systems.reference_generator import ReferenceGenerator
 from loco_drake.systems.scenario import GeneratedReference
 from loco_drake.systems.toppra_smoother import ToppraSmoother

@@ -22,9 +22,8 @@ from loco_drake.control.plan import Plan, plan_from_motion
 from loco_drake.datasets.registry import read_clip
 from loco_drake.models.robots import AddRobotModel, Robot, get_robot
 from loco_drake.retargeting.retarget import retarget_clip
-from loco_drake.systems.control import PlanState
+from loco_drake.systems.control import PlanPlayer, PlanState
 from loco_drake.systems.keypoint_visualizer import KeypointVisualizer
-from loco_drake.systems.plan_player import PlanPlayer
 
 
 def retarget(

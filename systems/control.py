@@ -1,10 +1,15 @@
-"""Systems between a plan and a plant. Each applies a function of control/."""
+"""Systems between a plan and a plant. Most apply a function of control/."""
 
 from typing import Any
 
 import torch
-from pydrake.common.value import Value
-from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import (
+    AbstractParameterIndex,
+    Context,
+    LeafSystem,
+    State,
+)
 
 from loco_drake.common.determinism import single_thread
 from loco_drake.control.action import joint_targets, set_points
@@ -14,6 +19,37 @@ from loco_drake.control.plan import PLAN_DT, Plan, standing_plan
 from loco_drake.control.reward import REWARD_TERMS, reward_terms
 from loco_drake.control.state import unit_base
 from loco_drake.models.robots import Robot
+
+
+class PlanPlayer(LeafSystem):
+    """Outputs the plan that is set in its Context.
+
+    .. pydrake_system::
+
+        name: PlanPlayer
+        output_ports:
+        - plan: abstract, Plan
+
+    The plan is an abstract parameter: constant during a simulation, and set for each
+    episode with :meth:`SetPlan`.
+
+    Args:
+        robot: the robot.
+        plan: the plan in a default Context; by default the robot stands.
+    """
+
+    def __init__(self, robot: Robot, plan: Plan | None = None) -> None:
+        super().__init__()
+        first = Value(plan or standing_plan(robot))
+        self._plan = AbstractParameterIndex(self.DeclareAbstractParameter(first))
+        self.DeclareAbstractOutputPort("plan", first.Clone, self._calc)
+
+    def SetPlan(self, context: Context, plan: Plan) -> None:
+        """Sets the plan to play in ``context``, which is this system's own."""
+        context.get_mutable_abstract_parameter(self._plan).set_value(plan)
+
+    def _calc(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(context.get_abstract_parameter(self._plan).get_value())
 
 
 class RobotState(LeafSystem):
@@ -35,9 +71,7 @@ class RobotState(LeafSystem):
         self.robot = robot
         size = 13 + 2 * len(robot.joint_names)
         self._state = self.DeclareVectorInputPort("plant_state", size)
-        self.DeclareVectorOutputPort(
-            "state", size, self._calc, prerequisites_of_calc={self._state.ticket()}
-        )
+        self.DeclareVectorOutputPort("state", size, self._calc)
 
     def _calc(self, context: Context, output: Any) -> None:
         output.set_value(unit_base(self._state.Eval(context)))
@@ -51,7 +85,6 @@ class _PlanFollower(LeafSystem):
         self._robot = robot
         self._joints = len(robot.joint_names)
         self._plan = self.DeclareAbstractInputPort("plan", Value(standing_plan(robot)))
-        self._plan_now = {self.time_ticket(), self._plan.ticket()}
 
     def _now(self, context: Context) -> tuple[Plan, int]:
         """Returns the plan and the index of its current sample."""
@@ -74,13 +107,9 @@ class PlanState(_PlanFollower):
 
     def __init__(self, robot: Robot) -> None:
         super().__init__(robot)
-        for name, size, calc in (
-            ("state", 13 + 2 * self._joints, self._calc_state),
-            ("path_time", 1, self._calc_path_time),
-        ):
-            self.DeclareVectorOutputPort(
-                name, size, calc, prerequisites_of_calc=self._plan_now
-            )
+        size = 13 + 2 * self._joints
+        self.DeclareVectorOutputPort("state", size, self._calc_state)
+        self.DeclareVectorOutputPort("path_time", 1, self._calc_path_time)
 
     def _calc_state(self, context: Context, output: Any) -> None:
         plan, k = self._now(context)
@@ -109,16 +138,7 @@ class Observation(_PlanFollower):
         super().__init__(robot)
         self._state = self.DeclareVectorInputPort("state", 13 + 2 * self._joints)
         self._action = self.DeclareVectorInputPort("action", self._joints)
-        self.DeclareVectorOutputPort(
-            "observation",
-            OBSERVATION_SIZE,
-            self._calc,
-            prerequisites_of_calc={
-                *self._plan_now,
-                self._state.ticket(),
-                self._action.ticket(),
-            },
-        )
+        self.DeclareVectorOutputPort("observation", OBSERVATION_SIZE, self._calc)
 
     def _calc(self, context: Context, output: Any) -> None:
         ahead = preview(self._plan.Eval(context), context.get_time())
@@ -144,12 +164,7 @@ class TrackingPolicy(LeafSystem):
         super().__init__()
         self._actor = actor
         self._observation = self.DeclareVectorInputPort("observation", OBSERVATION_SIZE)
-        self.DeclareVectorOutputPort(
-            "action",
-            12,
-            self._calc,
-            prerequisites_of_calc={self._observation.ticket()},
-        )
+        self.DeclareVectorOutputPort("action", 12, self._calc)
 
     def _calc(self, context: Context, output: Any) -> None:
         observation = torch.from_numpy(self._observation.Eval(context)).float()
@@ -181,25 +196,21 @@ class JointTargets(_PlanFollower):
         super().__init__(robot)
         still = 0 * robot.stand_joints
         self._action = self.DeclareVectorInputPort("action", self._joints)
-        self._targets = self.DeclareDiscreteState(
-            joint_targets(robot.stand_joints, still)
-        )
+        targets = joint_targets(robot.stand_joints, still)
+        self._targets = self.DeclareDiscreteState(targets)
         self._held = self.DeclareDiscreteState(still)
         # State output ports call no Python while the plant steps.
         self.DeclareStateOutputPort("desired_state", self._targets)
         self.DeclareStateOutputPort("action", self._held)
-        self.DeclarePeriodicUnrestrictedUpdateEvent(
-            period_sec=PLAN_DT, offset_sec=0.0, update=self._sample
-        )
+        self.DeclarePeriodicUnrestrictedUpdateEvent(PLAN_DT, 0.0, self._sample)
 
-    def _sample(self, context: Context, state: State) -> EventStatus:
+    def _sample(self, context: Context, state: State) -> None:
         plan = self._plan.Eval(context)
         action = self._action.Eval(context)
         due = set_points(self._robot, plan)[plan.index(context.get_time() + PLAN_DT)]
         targets = state.get_mutable_discrete_state(int(self._targets))
         targets.set_value(joint_targets(due, action))
         state.get_mutable_discrete_state(int(self._held)).set_value(action)
-        return EventStatus.Succeeded()
 
 
 class TrackingReward(_PlanFollower):
@@ -218,16 +229,10 @@ class TrackingReward(_PlanFollower):
     def __init__(self, robot: Robot) -> None:
         super().__init__(robot)
         self._state = self.DeclareVectorInputPort("state", 13 + 2 * self._joints)
-        self.DeclareVectorOutputPort(
-            "reward_terms",
-            len(REWARD_TERMS),
-            self._calc,
-            prerequisites_of_calc={*self._plan_now, self._state.ticket()},
-        )
+        self.DeclareVectorOutputPort("reward_terms", len(REWARD_TERMS), self._calc)
 
     def _calc(self, context: Context, output: Any) -> None:
         plan, k = self._now(context)
         state = self._state.Eval(context)
-        output.set_value(
-            reward_terms(self._robot, plan.state[k], plan.p_BoF_H[k], state)
-        )
+        terms = reward_terms(self._robot, plan.state[k], plan.p_BoF_H[k], state)
+        output.set_value(terms)

@@ -27,6 +27,7 @@ from loco_drake.motion.motion_file import load_motion
 from .control import (
     JointTargets,
     Observation,
+    PlanPlayer,
     PlanState,
     RobotState,
     TrackingPolicy,
@@ -34,9 +35,7 @@ from .control import (
 )
 from .domain import Actuation, Pushes, Sensors
 from .keypoint_visualizer import KeypointVisualizer
-from .plan_player import PlanPlayer
 from .scenario import (
-    ExternalAction,
     ExternalTargets,
     GeneratedReference,
     MotionReference,
@@ -50,13 +49,12 @@ from .toppra_smoother import ToppraSmoother
 class Locomotion:
     """The systems that :func:`AddLocomotion` added, with ports to connect."""
 
-    robot: Robot  # the robot
-    plant: MultibodyPlant  # the finalized plant that contains the robot
-    scene_graph: SceneGraph  # the plant's scene graph
-    instance: ModelInstanceIndex  # the robot's model instance in the plant
-    # Input ports by name, see MakeLocomotionDiagram.
+    robot: Robot
+    plant: MultibodyPlant  # finalized; contains the robot
+    scene_graph: SceneGraph
+    instance: ModelInstanceIndex  # the robot's in the plant
+    # Ports by name, see MakeLocomotionDiagram.
     inputs: dict[str, InputPort] = field(default_factory=dict)
-    # Output ports by name, see MakeLocomotionDiagram.
     outputs: dict[str, OutputPort] = field(default_factory=dict)
 
     def ExportPorts(self, builder: DiagramBuilder) -> None:
@@ -151,9 +149,9 @@ def AddLocomotion(
         builder, robot, scenario.plant, pre_finalize
     )
     made = Locomotion(robot, plant, scene_graph, instance)
-    robot_state = builder.AddNamedSystem("robot_state", RobotState(robot))
-    builder.Connect(
-        plant.get_state_output_port(instance), robot_state.GetInputPort("plant_state")
+    plant_state = plant.get_state_output_port(instance)
+    robot_state = _Add(
+        builder, "robot_state", RobotState(robot), plant_state=plant_state
     )
     state = robot_state.GetOutputPort("state")
     measured, desired_state = _AddDisturbances(builder, made, scenario, state)
@@ -199,13 +197,12 @@ def _AddDisturbances(
     """
     robot, plant, wanted = made.robot, made.plant, scenario.disturbances
     desired_state = plant.get_desired_state_input_port(made.instance)
-    measured = state
     if wanted.actuation:
         actuation = Actuation(robot, scenario.plant)
         _Add(builder, "actuation", actuation, state=state)
-        builder.Connect(actuation.GetOutputPort("desired_state"), desired_state)
-        desired_state = actuation.GetInputPort("desired_state")
         made.outputs["desired_state"] = actuation.GetOutputPort("desired_state")
+        builder.Connect(made.outputs["desired_state"], desired_state)
+        desired_state = actuation.GetInputPort("desired_state")
     if wanted.pushes:
         trunk = plant.GetBodyByName(robot.trunk_frame, made.instance).index()
         pushes = _Add(builder, "pushes", Pushes(trunk))
@@ -215,25 +212,25 @@ def _AddDisturbances(
         )
     if wanted.sensors:
         sensors = _Add(builder, "sensors", Sensors(robot), state=state)
-        measured = sensors.GetOutputPort("state")
-    return measured, desired_state
+        state = sensors.GetOutputPort("state")
+    return state, desired_state
 
 
 def _AddPlan(builder: DiagramBuilder, made: Locomotion, scenario: Scenario) -> None:
     """Adds the reference and the smoother."""
-    reference = _MakeReference(made.robot, scenario)
-    _Add(builder, "reference", reference)
-    made.outputs["plan"] = reference.GetOutputPort("plan")
+    reference = _Add(builder, "reference", _MakeReference(made.robot, scenario))
+    plan = reference.GetOutputPort("plan")
     if reference.HasInputPort("gait"):
         made.inputs["gait"] = reference.GetInputPort("gait")
     if scenario.smoother is not None:
         smoother = ToppraSmoother(made.robot, scenario.smoother)
-        _Add(builder, "smoother", smoother, plan=made.outputs["plan"])
-        made.outputs["plan"] = smoother.GetOutputPort("plan")
+        _Add(builder, "smoother", smoother, plan=plan)
+        plan = smoother.GetOutputPort("plan")
         if reference.HasInputPort("path_time"):
             builder.Connect(
                 smoother.GetOutputPort("path_time"), reference.GetInputPort("path_time")
             )
+    made.outputs["plan"] = plan
 
 
 def _MakeReference(robot: Robot, scenario: Scenario) -> LeafSystem:
@@ -263,12 +260,12 @@ def _AddControl(
     observation = Observation(robot)
     _Add(builder, "observation", observation, plan=plan, state=state, action=action)
     seen = observation.GetOutputPort("observation")
-    if isinstance(scenario.policy, ExternalAction):
-        made.inputs["action"] = targets.GetInputPort("action")
-    elif isinstance(scenario.policy, TrainedPolicy):
+    if isinstance(scenario.policy, TrainedPolicy):
         actor = load_actor(policy_path(robot, scenario.policy.weights), robot)
         policy = _Add(builder, "policy", TrackingPolicy(actor), observation=seen)
         builder.Connect(policy.GetOutputPort("action"), targets.GetInputPort("action"))
+    else:
+        made.inputs["action"] = targets.GetInputPort("action")
     made.outputs["observation"] = seen
     made.outputs["action"] = action
     # Actuation, if present, has already set the port that reaches the PD.

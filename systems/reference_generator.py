@@ -1,20 +1,13 @@
 """The system that generates motion of a gait while the simulation runs."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import (
-    AbstractStateIndex,
-    Context,
-    EventStatus,
-    LeafSystem,
-    State,
-)
+from pydrake.systems.framework import Context
 
 from loco_drake.common.errors import InputError
-from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD, Plan, join_plans, make_plan
+from loco_drake.common.immutable import Immutable
+from loco_drake.control.plan import PLAN_DT, Plan, join_plans, make_plan
 from loco_drake.generation.generate import chunk_labels
 from loco_drake.generation.motion_model import (
     MotionModel,
@@ -25,24 +18,22 @@ from loco_drake.models.robots import Robot
 from loco_drake.motion.gait_schedule import GaitSchedule, parse_schedule
 from loco_drake.motion.gaits import LABELS, GaitLabel
 
+from .plan_producer import PlanProducer
 from .scenario import GeneratedReference
 
 _KEEP = 1.0  # seconds of plan kept behind what has been used up
 
 
 @dataclass(frozen=True, eq=False)
-class _Script:
-    """The immutable state: the plan so far and how to continue it."""
+class _Script(Immutable):
+    """The plan so far and how to continue it."""
 
     schedule: GaitSchedule
     stream: Stream
     plan: Plan | None = None
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "_Script":
-        return self
 
-
-class ReferenceGenerator(LeafSystem):
+class ReferenceGenerator(PlanProducer):
     """Generates a plan for a gait with the GPT, chunk by chunk, ahead of its use.
 
     .. pydrake_system::
@@ -87,17 +78,7 @@ class ReferenceGenerator(LeafSystem):
         self._model = model or pretrained_motion_model(robot.name)
         self._gait = self.DeclareVectorInputPort("gait", 1)
         self._path_time = self.DeclareVectorInputPort("path_time", 1)
-        first = self._begun(self._config.gait, self._config.seed)
-        self._script = AbstractStateIndex(self.DeclareAbstractState(Value(first)))
-        self.DeclareAbstractOutputPort(
-            "plan",
-            lambda: Value(first.plan),
-            self._calc_plan,
-            prerequisites_of_calc={self.abstract_state_ticket(self._script)},
-        )
-        self.DeclarePeriodicUnrestrictedUpdateEvent(
-            period_sec=UPDATE_PERIOD, offset_sec=0.0, update=self._update
-        )
+        self._DeclarePlan(self._begun(self._config.gait, self._config.seed))
 
     def SetReference(
         self, context: Context, *, gait: str | None = None, seed: int | None = None
@@ -118,8 +99,7 @@ class ReferenceGenerator(LeafSystem):
             seed=self._config.seed if seed is None else seed,
         )
         config.check()
-        script = self._begun(config.gait, config.seed)
-        context.get_mutable_abstract_state(int(self._script)).set_value(script)
+        self._set(context, self._begun(config.gait, config.seed))
 
     def _begun(self, gait: str, seed: int) -> _Script:
         """Returns the script at time 0 with its first chunks generated."""
@@ -128,71 +108,54 @@ class ReferenceGenerator(LeafSystem):
         )
         schedule = parse_schedule(gait)
         self._model.check_labels(schedule.at(schedule.starts))
-        return self._written(_Script(schedule, stream), schedule, 0.0)
+        return self._written(_Script(schedule, stream), 0.0)
 
-    def _calc_plan(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self._get(context).plan)
-
-    def _get(self, context: Context) -> _Script:
-        script = context.get_abstract_state(int(self._script)).get_value()
-        assert isinstance(script, _Script)
-        return script
-
-    def _update(self, context: Context, state: State) -> EventStatus:
-        old = self._get(context)
-        schedule = old.schedule
+    def _next(self, context: Context, script: _Script) -> _Script:
         if self._gait.HasValue(context):
-            schedule = GaitSchedule((self._label(self._gait.Eval(context)[0]),))
+            gait = self._label(self._gait.Eval(context)[0])
+            script = replace(script, schedule=GaitSchedule((gait,)))
         used = context.get_time()
         if self._path_time.HasValue(context):
             used = float(self._path_time.Eval(context)[0])
-        new = self._written(old, schedule, used)
-        if new is old:
-            return EventStatus.DidNothing()
-        state.get_mutable_abstract_state(int(self._script)).set_value(new)
-        return EventStatus.Succeeded()
+        return self._written(script, used)
 
     def _label(self, index: float) -> GaitLabel:
         """Returns the gait that the input port selects."""
         known = self._model.generator.config.labels
-        if index not in [k for k, label in enumerate(LABELS) if str(label) in known]:
-            choices = ", ".join(
-                f"{k} {label}" for k, label in enumerate(LABELS) if str(label) in known
-            )
+        choices = {k: label for k, label in enumerate(LABELS) if str(label) in known}
+        if index not in choices:
             raise InputError(
-                f"The input port gait must be the index of a gait, {choices}; not "
+                f"The input port gait must be the index of a gait, "
+                f"{', '.join(f'{k} {label}' for k, label in choices.items())}; not "
                 f"{index:g}."
             )
-        return LABELS[int(index)]
+        return choices[int(index)]
 
-    def _written(self, script: _Script, schedule: GaitSchedule, used: float) -> _Script:
+    def _written(self, script: _Script, used: float) -> _Script:
         """Returns ``script`` with chunks added until the horizon is reached."""
-        while script.plan is None or (script.plan.path_time[-1] < used + self._horizon):
+        plan, stream = script.plan, script.stream
+        while plan is None or plan.path_time[-1] < used + self._horizon:
+            labels = chunk_labels(self._model, script.schedule, stream.chunk)
             stream, frames = self._model.extend(
-                script.stream,
-                chunk_labels(self._model, schedule, script.stream.chunk)[None],
+                stream,
+                labels[None],
                 temperature=self._config.temperature,
                 top_p=self._config.top_p,
             )
-            plan = script.plan
             count = 0 if plan is None else round(plan.path_time[-1] / PLAN_DT) + 1
-            times = PLAN_DT * np.arange(count, count + frames.q.shape[1])
+            chunk = frames[0]
             added = make_plan(
                 self._robot,
-                q=frames.q[0],
-                v=frames.v[0],
-                contacts=frames.contacts[0],
-                labels=frames.labels[0],
+                q=chunk.q,
+                v=chunk.v,
+                contacts=chunk.contacts,
+                labels=chunk.labels,
                 start_time=count * PLAN_DT,
-                path_time=times,
+                path_time=PLAN_DT * np.arange(count, count + len(chunk.q)),
                 open_ended=True,
             )
-            script = _Script(
-                schedule, stream, added if plan is None else join_plans(plan, added)
-            )
-        plan = script.plan
-        assert plan is not None
+            plan = added if plan is None else join_plans(plan, added)
         old = int(np.searchsorted(plan.path_time, used - _KEEP))
         if old > self._model.chunk_frames:
-            script = replace(script, plan=plan.tail(old))
-        return script
+            plan = plan.tail(old)
+        return replace(script, stream=stream, plan=plan)

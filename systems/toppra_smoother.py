@@ -3,17 +3,18 @@
 from dataclasses import replace
 from typing import Any
 
-from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
+from pydrake.common.value import Value
+from pydrake.systems.framework import Context, State
 
-from loco_drake.control.plan import UPDATE_PERIOD, Plan, standing_plan
+from loco_drake.control.plan import UPDATE_PERIOD, standing_plan
 from loco_drake.control.retiming import PathLimits, Progress, path_limits, smooth_chunk
 from loco_drake.models.robots import Robot
 
+from .plan_producer import PlanProducer
 from .scenario import SmootherConfig
 
 
-class ToppraSmoother(LeafSystem):
+class ToppraSmoother(PlanProducer):
     """Re-times the incoming plan so that joints and base satisfy :func:`path_limits`.
 
     .. pydrake_system::
@@ -52,57 +53,38 @@ class ToppraSmoother(LeafSystem):
         self._limits = limits or path_limits(robot)
         rest = standing_plan(robot)
         self._plan_in = self.DeclareAbstractInputPort("plan", Value(rest))
-        self._progress = self.DeclareAbstractState(Value(Progress(rest)))
-        state = {self.abstract_state_ticket(self._progress)}
-        self.DeclareAbstractOutputPort(
-            "plan", lambda: Value(rest), self._calc_plan, prerequisites_of_calc=state
-        )
+        self._DeclarePlan(Progress(rest))
         self.DeclareVectorOutputPort(
-            "path_time", 1, self._calc_path_time, prerequisites_of_calc=state
+            "path_time",
+            1,
+            self._calc_path_time,
+            prerequisites_of_calc={self.xa_ticket()},
         )
         self.DeclareInitializationUnrestrictedUpdateEvent(self._initialize)
-        self.DeclarePeriodicUnrestrictedUpdateEvent(
-            period_sec=UPDATE_PERIOD, offset_sec=0.0, update=self._update
-        )
-
-    def _calc_plan(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self._get(context).plan)
 
     def _calc_path_time(self, context: Context, output: Any) -> None:
         output[0] = self._get(context).path_time
 
-    def _get(self, context: Context) -> Progress:
-        progress = context.get_abstract_state(int(self._progress)).get_value()
-        assert isinstance(progress, Progress)
-        return progress
-
-    def _initialize(self, context: Context, state: State) -> EventStatus:
+    def _initialize(self, context: Context, state: State) -> None:
         # The clone of a Context that has run continues as the original would.
-        if self._get(context).goes_on_in(self._plan_in.Eval(context)):
-            return EventStatus.DidNothing()
-        return self._update(context, state)
+        if not self._get(context).goes_on_in(self._plan_in.Eval(context)):
+            self._update(context, state)
 
-    def _update(self, context: Context, state: State) -> EventStatus:
-        old = self._get(context)
-        new = self._extended(old, self._plan_in.Eval(context), context.get_time())
-        if new is old:
-            return EventStatus.DidNothing()
-        state.get_mutable_abstract_state(int(self._progress)).set_value(new)
-        return EventStatus.Succeeded()
-
-    def _extended(self, progress: Progress, raw: Plan, now: float) -> Progress:
+    def _next(self, context: Context, progress: Progress) -> Progress:
         """Returns ``progress`` with all chunks added that are due and available."""
-        ahead = now + self._config.lookahead + UPDATE_PERIOD
+        now, raw = context.get_time(), self._plan_in.Eval(context)
+        lookahead = self._config.lookahead
         if not progress.goes_on_in(raw):
             progress = Progress(standing_plan(self._robot, now))
-        while progress.source is None or progress.plan.end_time < ahead:
+        due = now + lookahead + UPDATE_PERIOD
+        while progress.source is None or progress.plan.end_time < due:
             extended = smooth_chunk(
                 self._robot, self._limits, progress, raw, self._config.chunk
             )
             if extended is None:
                 break
             progress = extended
-        if progress.plan.start_time < now - 2 * self._config.lookahead:
-            keep = progress.plan.index(now - self._config.lookahead)
+        if progress.plan.start_time < now - 2 * lookahead:
+            keep = progress.plan.index(now - lookahead)
             progress = replace(progress, plan=progress.plan.tail(keep))
         return progress

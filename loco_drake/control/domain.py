@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError, check_number
+from loco_drake.common.immutable import Immutable
 from loco_drake.models.parameters import LEAST_PAYLOAD
 
 Array = NDArray[np.float64]
@@ -92,10 +93,8 @@ class SensorErrors(_Checked):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Domain(_Checked):
+class Domain(_Checked, Immutable):
     """The parameters of one world; those that are not given are as in the model.
-
-    A Domain is immutable, and a copy is the same object.
 
     Raises:
         InputError: if a number is not within :data:`BOUNDS`.
@@ -125,9 +124,3 @@ class Domain(_Checked):
         if name == "actuation":
             return self.strength is not None or self.latency > 0
         return bool(self.pushes) if name == "pushes" else self.sensors is not None
-
-    def __copy__(self) -> "Domain":
-        return self
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Domain":
-        return self

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError
+from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import quat_conjugate, quat_rotate, yaw_of, yaw_quat
 from loco_drake.control.state import JOINTS, ORIENTATION, POSITION, unit_base
 from loco_drake.models.robots import Robot
@@ -26,16 +27,14 @@ _MAX_NORM_ERROR = 1e-3  # of quaternions
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(Immutable):
     """An immutable stretch of motion on its own clock, sampled every PLAN_DT.
 
     Sample k is due at Context time ``start_time + k * PLAN_DT``. ``q`` and ``v`` are in
     the order of the robot's MultibodyPlant: ``q = [R_WB as w x y z, p_WB, joints]`` and
     ``v = [w_WB_W, v_WB_W, joint velocities]``.
 
-    A Plan owns its arrays, which are read-only. It is stored in abstract state and
-    compared by identity. Copying returns the same object, because Drake copies all
-    abstract state at each unrestricted update.
+    A Plan owns its arrays, which are read-only, and is compared by identity.
 
     Raises:
         InputError: if an array has an invalid type, shape or value.
@@ -56,17 +55,9 @@ class Plan:
 
     def __post_init__(self) -> None:
         n, size = np.shape(self.q) if np.ndim(self.q) == 2 else (0, 0)
-        shapes = (
-            (n, size),
-            (n, size - 1),
-            (n, size - 1),
-            (n, 4, 3),
-            (n, 4),
-            (n,),
-            (n,),
-        )
+        rows = ((size,), (size - 1,), (size - 1,), (4, 3), (4,), (), ())
         types = {"contacts": np.bool_, "labels": np.int64}
-        for name, shape in zip(_ARRAYS, shapes, strict=True):
+        for name, row in zip(_ARRAYS, rows, strict=True):
             wanted = types.get(name, np.float64)
             given = np.asarray(getattr(self, name))
             if not np.can_cast(given.dtype, wanted, "same_kind"):
@@ -74,7 +65,7 @@ class Plan:
                     f"A plan's {name} must be of type {wanted.__name__}, "
                     f"not {given.dtype}."
                 )
-            if given.shape != shape or n < 1 or size < 8:
+            if given.shape != (n, *row) or n < 1 or size < 8:
                 raise InputError(
                     f"A plan's q must have the shape (N, 7 + J), N at least 1, and its "
                     f"{name} one that goes with that, not {given.shape}."
@@ -105,12 +96,6 @@ class Plan:
 
     def __len__(self) -> int:
         return len(self.q)
-
-    def __copy__(self) -> "Plan":
-        return self
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Plan":
-        return self
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Unpickled arrays would be writable.

@@ -1,7 +1,6 @@
 """TOPP-RA along a plan, which slows it to the limits and never speeds it up."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import toppra
@@ -11,6 +10,7 @@ from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 from toppra.interpolator import AbstractGeometricPath
 
+from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import quat_continuous
 from loco_drake.control.action import GRAVITY
 from loco_drake.control.plan import (
@@ -192,16 +192,13 @@ def _sample(grid: Array, rates: Array, commit: float) -> Clock:
 
 
 @dataclass(frozen=True, eq=False)
-class Progress:
-    """The state of re-timing a plan. It is immutable, and a copy is the same object."""
+class Progress(Immutable):
+    """The state of re-timing a plan."""
 
     plan: Plan  # the re-timed plan
     path_time: float = 0.0  # plan time of its last sample, s
     rate: float = 1.0  # ds/dt of its last sample
     source: Plan | None = None  # the plan that was re-timed; None at first
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Progress":
-        return self
 
     def goes_on_in(self, raw: Plan) -> bool:
         """Returns whether ``raw`` contains the sample that was re-timed last.

@@ -4,7 +4,6 @@ from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from loco_drake.common.determinism import single_thread, uniforms
 from loco_drake.common.errors import InputError
+from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import quat_error
 from loco_drake.generation.features import rotate_plane
 from loco_drake.generation.footing import Footing, start_footing, step_footing
@@ -31,8 +31,8 @@ SETTLING = 4  # frames before the first one, in which feet reach the ground
 
 
 @dataclass(frozen=True, eq=False)
-class Stream:
-    """Immutable state of B motions in generation; copies are the same object.
+class Stream(Immutable):
+    """Immutable state of B motions in generation.
 
     One frame is held back, since its velocity needs the frame after it.
 
@@ -63,12 +63,6 @@ class Stream:
         for value in (*vars(self).values(), *vars(self.footing).values()):
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
-
-    def __copy__(self) -> "Stream":
-        return self
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Stream":
-        return self
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,8 +5,7 @@ from pydrake.systems.framework import DiagramBuilder
 from loco_drake.control.action import ACTION_SCALE, feed_forward_torques
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.models.robots import get_robot
-from loco_drake.systems.control import JointTargets
-from loco_drake.systems.plan_player import PlanPlayer
+from loco_drake.systems.control import JointTargets, PlanPlayer
 
 
 def build(robot, plan):

@@ -5,7 +5,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.retiming import PathLimits, path_limits, smooth_plan
-from loco_drake.systems.plan_player import PlanPlayer
+from loco_drake.systems.control import PlanPlayer
 from loco_drake.systems.toppra_smoother import ToppraSmoother
 
 
