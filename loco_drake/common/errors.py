@@ -102,8 +102,11 @@ def check_number(what: str, value: Any, low: float, high: float = inf) -> None:
         high: largest valid value; infinity for no bound.
     """
     number = isinstance(value, Real) and not isinstance(value, bool)
-    if not (number and isfinite(value) and low <= value <= high):
-        most = "" if high == inf else f" to {high:g}"
-        bounds = f"from {low:g}{most}" if most else f"of at least {low:g}"
+    try:
+        valid = number and isfinite(value) and low <= value <= high
         given = value if number else quoted(value)
+    except OverflowError:
+        valid, given = False, "an integer beyond 1e308"
+    if not valid:
+        bounds = f"of at least {low:g}" if high == inf else f"from {low:g} to {high:g}"
         raise InputError(f"{what} must be a number {bounds}, not {given}.")

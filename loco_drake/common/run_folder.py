@@ -7,15 +7,16 @@ import signal
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import FrameType, UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from types import FrameType
+from typing import Any, TypeVar
 
 import torch
 from torch import Tensor, nn
 
 from loco_drake.common.errors import InputError
+from loco_drake.common.typed import convert
 from loco_drake.common.weights import load_into, load_weights, save_weights
 
 CHECKPOINT = "checkpoint.safetensors"
@@ -28,21 +29,13 @@ Config = TypeVar("Config")
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """The content of a checkpoint.
+    """The content of a checkpoint."""
 
-    Attributes:
-        path: the file.
-        tensors: networks, optimizer, random states.
-        state: further state of the training; "steps" are those done.
-        run: options and data that the training depends on, by name.
-        options: options of the command, as nested JSON.
-    """
-
-    path: Path
-    tensors: dict[str, Tensor]
-    state: dict[str, Any]
-    run: dict[str, Any]
-    options: dict[str, Any]
+    path: Path  # of the file
+    tensors: dict[str, Tensor]  # networks, optimizer, random states
+    state: dict[str, Any]  # further state of the training; "steps" are those done
+    run: dict[str, Any]  # options and data that the training depends on, by name
+    options: dict[str, Any]  # options of the command, as nested JSON
 
 
 def read_checkpoint(path: Path, name: str) -> Checkpoint:
@@ -76,19 +69,12 @@ def read_checkpoint(path: Path, name: str) -> Checkpoint:
 
 @dataclass(frozen=True)
 class RunFolder:
-    """A folder locked by one training.
+    """A folder locked by one training."""
 
-    Attributes:
-        path: of the checkpoint.
-        kind: of the checkpoint.
-        header: "run" and "options", see :class:`Checkpoint`.
-        saved: the checkpoint to continue from, None at the start.
-    """
-
-    path: Path
-    kind: str
-    header: dict[str, Any]
-    saved: Checkpoint | None
+    path: Path  # of the checkpoint
+    kind: str  # of the checkpoint
+    header: dict[str, Any]  # "run" and "options", see Checkpoint
+    saved: Checkpoint | None  # to continue from, None at the start
 
     def save(self, tensors: dict[str, Tensor], state: dict[str, Any]) -> None:
         """Replaces the checkpoint; see :class:`Checkpoint`."""
@@ -217,41 +203,17 @@ def with_options(config: Config, options: Mapping[str, Any]) -> Config:
     Fields that ``options`` lacks keep their value; unknown options are ignored.
 
     Raises:
-        TypeError: if a value is not of the field's type.
+        FieldError: if a value is not of the field's type.
     """
-    changes = {}
-    hints = get_type_hints(type(config))
-    for field in fields(config):  # type: ignore[arg-type]
-        if field.name in options:
-            old, new = getattr(config, field.name), options[field.name]
-            if not _fits(hints[field.name], new):
-                raise TypeError(field.name)
-            if is_dataclass(old):
-                new = with_options(old, new)
-            elif isinstance(new, list) and not isinstance(old, list):
-                new = tuple(Path(x) if "Path" in str(field.type) else x for x in new)
-            elif isinstance(new, str) and "Path" in str(field.type):
-                new = Path(new)
-            changes[field.name] = new
-    return replace(config, **changes)  # type: ignore[type-var]
 
+    def updated(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+        values = {**old, **{name: new[name] for name in old if name in new}}
+        for name, value in old.items():
+            if isinstance(value, dict) and isinstance(values[name], dict):
+                values[name] = updated(value, values[name])
+        return values
 
-def _fits(hint: Any, value: Any) -> bool:
-    """Returns whether JSON is what :func:`options_of` makes of a field of that type."""
-    inner = get_args(hint)
-    if get_origin(hint) in (UnionType, Union):
-        return any(_fits(item, value) for item in inner)
-    if get_origin(hint) in (tuple, list):
-        if not isinstance(value, list):
-            return False
-        # Of one type as many as there are, tuple[T, ...] or list[T]; else one of each.
-        many = get_origin(hint) is list or inner[-1] is ...
-        of = inner[:1] * len(value) if many else inner
-        return len(of) == len(value) and all(map(_fits, of, value))
-    if is_dataclass(hint):
-        return isinstance(value, dict)
-    kinds = {float: (float, int), Path: (str,)}
-    return type(value) in kinds.get(hint, (hint,))
+    return convert(updated(options_of(config), options), type(config))
 
 
 def learning_tensors(

@@ -1,15 +1,13 @@
 """YAML files as typed dataclasses, with errors that name the field."""
 
-import reprlib
-from dataclasses import fields, is_dataclass
 from pathlib import Path
-from types import UnionType
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import TypeVar
 
 import yaml
 from pydrake.common.yaml import yaml_load
 
 from loco_drake.common.errors import InputError, quoted
+from loco_drake.common.typed import FieldError, convert
 
 T = TypeVar("T")
 
@@ -39,14 +37,14 @@ def read_yaml(path: Path, schema: type[T], what: str) -> T:
         text = path.read_text(encoding="utf-8-sig")
         refuse_repeated_keys(text)
         data = yaml_load(data=text) if text.strip() else {}
-        result: T = _convert(data, schema, "it")
+        result: T = convert(data, schema, numeric_text=True)
     except RecursionError:
         raise InputError(f"{path} is not {what}: it is nested too deeply.") from None
     except AttributeError:  # Drake asks keys how they begin
         raise InputError(f"{path} is not {what}: every key must be text.") from None
     except Exception as error:  # Drake and PyYAML raise many kinds
         reason = " ".join(str(error).split()).removesuffix(".")
-        if len(reason) > _MAX_REASON and not isinstance(error, InputError):
+        if len(reason) > _MAX_REASON and not isinstance(error, InputError | FieldError):
             reason = reason[:_MAX_REASON] + "..."
         raise InputError(f"{path} is not {what}: {reason}.") from None
     return result
@@ -74,59 +72,3 @@ def refuse_repeated_keys(text: str) -> None:
                     raise InputError(f"line {line} names {quoted(name)} a second time")
                 names.add(name)
                 nodes.append(value)
-
-
-def _convert(value: Any, kind: Any, where: str) -> Any:
-    """Returns ``value`` as ``kind``; raises InputError naming ``where``."""
-    if isinstance(kind, UnionType):
-        if value is None:
-            return None
-        kind = get_args(kind)[0]
-    if is_dataclass(kind):
-        known = {field.name for field in fields(kind)}
-        rows = _mapping(value, where, f"of {', '.join(sorted(known))}")
-        for key in rows:
-            if key not in known:
-                raise InputError(
-                    f"{where} has the unknown field {_short(key)}; "
-                    f"there are {', '.join(sorted(known))}"
-                )
-        hints = get_type_hints(kind)
-        return kind(  # type: ignore[operator]
-            **{k: _convert(v, hints[k], _inside(where, k)) for k, v in rows.items()}
-        )
-    if get_origin(kind) is dict:
-        (_, inner) = get_args(kind)
-        rows = _mapping(value, where, "by name")
-        return {str(k): _convert(v, inner, _inside(where, k)) for k, v in rows.items()}
-    if get_origin(kind) is list:
-        if not isinstance(value, list):
-            raise InputError(f"{where} must be a list, not {_short(value)}")
-        (inner,) = get_args(kind)
-        return [_convert(item, inner, f"an item of {where}") for item in value]
-    if kind is float:
-        # PyYAML takes 1e-3 for text.
-        try:
-            if isinstance(value, int | float | str) and not isinstance(value, bool):
-                return float(value)
-        except (ValueError, OverflowError):
-            pass
-        raise InputError(f"{where} must be a number, not {_short(value)}")
-    if not isinstance(value, kind):
-        raise InputError(f"{where} must be text, not {_short(value)}")
-    return value
-
-
-def _mapping(value: Any, where: str, of: str) -> dict[Any, Any]:
-    if not isinstance(value, dict):
-        raise InputError(f"{where} must be a mapping {of}, not {_short(value)}")
-    return value
-
-
-def _inside(where: str, key: object) -> str:
-    return str(key)[:60] if where == "it" else f"{where}.{str(key)[:60]}"
-
-
-def _short(value: object) -> str:
-    text = reprlib.repr(value)  # of aliases within aliases only so much
-    return text if len(text) <= 60 else f"{text[:57]}..."

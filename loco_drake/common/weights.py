@@ -1,11 +1,10 @@
 """Network weights as safetensors files with a descriptive header."""
 
 import json
-import sys
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -14,6 +13,7 @@ from torch import Tensor
 
 from loco_drake.common.errors import InputError, quoted
 from loco_drake.common.files import atomic_path, content_sha256, parse_json
+from loco_drake.common.typed import FieldError, convert
 
 FORMAT_VERSION = 1
 MAX_BYTES = 4 * 2**30  # of a file
@@ -134,8 +134,8 @@ def read_config(config_class: type[Config], values: Any, path: Path) -> Config:
     """Returns a dataclass from a header, with each field checked.
 
     Args:
-        config_class: fields are int, float, bool, str or Any, or lists or tuples of
-            these; those with a default may be missing.
+        config_class: see :func:`.typed.convert`; ``BEFORE`` holds former names of its
+            fields.
         values: the fields as JSON.
         path: the file, for messages.
 
@@ -143,41 +143,26 @@ def read_config(config_class: type[Config], values: Any, path: Path) -> Config:
         InputError: if a field is unknown, missing, of the wrong type, or an invalid
             size.
     """
-    hints = get_type_hints(config_class)
-    before = getattr(config_class, "BEFORE", {})  # former names of fields
-    values = values if isinstance(values, dict) else {}
-    values = {before.get(name, name): value for name, value in values.items()}
-    needed = [
-        field.name
-        for field in fields(config_class)  # type: ignore[arg-type]
-        if field.default is MISSING and field.default_factory is MISSING
-    ]
-    wrong = [name for name in needed if name not in values]
-    wrong += [k for k, v in values.items() if k not in hints or not _is(hints[k], v)]
-    if wrong:
-        raise InputError(f"{path} has a damaged header: {quoted(wrong[0])} is wrong.")
-    return config_class(
-        **{
-            k: tuple(v) if get_origin(hints[k]) is tuple else v
-            for k, v in values.items()
-        }
-    )
+    before = getattr(config_class, "BEFORE", {})
+    if isinstance(values, dict):
+        values = {before.get(name, name): value for name, value in values.items()}
+    try:
+        config = convert(values, config_class)
+        for name, value in vars(config).items():
+            if not _is_size(value):
+                raise FieldError(name, "is no size")
+    except FieldError as error:
+        raise InputError(
+            f"{path} has a damaged header: {quoted(error.field)} is wrong."
+        ) from None
+    return config
 
 
-def _is(hint: Any, value: Any) -> bool:
-    """Returns whether a JSON value has a type, is finite and is a reasonable size."""
-    if get_origin(hint) in (list, tuple):
-        item = get_args(hint)[0]
-        return (
-            isinstance(value, list)
-            and len(value) <= MAX_SIZE
-            and all(_is(item, v) for v in value)
-        )
-    if hint is int:
-        return type(value) is int and 1 <= value <= MAX_SIZE
-    if hint is float:
-        return type(value) in (int, float) and abs(value) <= sys.float_info.max
-    return hint is Any or isinstance(value, hint)
+def _is_size(value: Any) -> bool:
+    """Returns whether integers, and numbers of items, are sizes of a network."""
+    if isinstance(value, list | tuple):
+        return len(value) <= MAX_SIZE and all(map(_is_size, value))
+    return type(value) is not int or 1 <= value <= MAX_SIZE
 
 
 def build_network(
@@ -204,6 +189,27 @@ def build_network(
         planned = make(config)
     load_into(planned, dict(tensors), path)
     return planned
+
+
+def save_network(
+    path: Path,
+    kind: str,
+    network: Any,
+    info: Mapping[str, Any] | None = None,
+    *,
+    half: bool = False,
+) -> None:
+    """Writes a network for :func:`load_network`.
+
+    Args:
+        path: the file.
+        kind: kind of weights.
+        network: a module whose ``config`` is a dataclass.
+        info: JSON for readers of the header.
+        half: see :func:`save_weights`.
+    """
+    config = {"network": asdict(network.config), "info": info or {}}
+    save_weights(path, kind, network.state_dict(), config, half=half)
 
 
 def load_network(

@@ -56,7 +56,7 @@ class _Checked:
                 continue
             try:
                 array = np.array(value, dtype=np.float64)
-            except (TypeError, ValueError):
+            except (TypeError, ValueError, OverflowError):
                 array = np.zeros(0)
             size = shapes[field.name]
             inside = np.isfinite(array) & (low <= array) & (array <= high)

@@ -18,7 +18,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from loco_drake.common.determinism import single_thread
-from loco_drake.common.weights import load_network, save_weights
+from loco_drake.common.weights import load_network, save_network
 from loco_drake.evaluation.samples import CHANNELS, FRAMES, Samples, label_weights
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.training import LoopResult, train
@@ -163,8 +163,8 @@ def train_classifier(
     classifier.requires_grad_(False)
     if not result.stopped:
         path = Path(settings.out) / "classifier.safetensors"
-        header = {"network": asdict(config), "info": {"trajectories": len(samples)}}
-        save_weights(path, "classifier", classifier.state_dict(), header)
+        info = {"trajectories": len(samples)}
+        save_network(path, "classifier", classifier, info)
     return classifier, result
 
 

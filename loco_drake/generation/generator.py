@@ -6,16 +6,16 @@ residual codebooks refine one another.
 """
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from loco_drake.common.weights import load_network, save_weights
+from loco_drake.common.weights import load_network
 from loco_drake.generation import speed_rank
 from loco_drake.generation.layers import RotaryAttention
 from loco_drake.motion.gaits import LABELS, ONE_HOT, ONE_HOT_SIZE
@@ -268,12 +268,6 @@ def _initialize(module: nn.Module) -> None:
         nn.init.normal_(module.weight, std=0.02)
     if isinstance(module, nn.Linear) and module.bias is not None:
         nn.init.zeros_(module.bias)
-
-
-def save_generator(generator: Generator, path: Path, info: dict[str, Any]) -> None:
-    """Writes weights in 16 bits, with ``info`` for readers in the header."""
-    config = {"network": asdict(generator.config), "info": info}
-    save_weights(path, "generator", generator.state_dict(), config, half=True)
 
 
 def load_generator(path: Path) -> Generator:

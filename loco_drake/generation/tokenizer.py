@@ -6,15 +6,15 @@ because the quantization library takes seconds to import.
 """
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
 
-from loco_drake.common.weights import load_network, save_weights
+from loco_drake.common.weights import load_network
 from loco_drake.generation.features import CONTACTS, SIZE
 from loco_drake.generation.layers import ConvBlock
 
@@ -145,12 +145,6 @@ class Tokenizer(nn.Module):
             data = value.half() if value.is_floating_point() else value
             digest.update(name.encode() + data.contiguous().numpy().tobytes())
         return digest.hexdigest()[:16]
-
-
-def save_tokenizer(tokenizer: Tokenizer, path: Path, info: dict[str, Any]) -> None:
-    """Writes weights in 16 bits, with ``info`` for readers in the header."""
-    config = {"network": asdict(tokenizer.config), "info": info}
-    save_weights(path, "tokenizer", tokenizer.state_dict(), config, half=True)
 
 
 def load_tokenizer(path: Path) -> Tokenizer:

@@ -12,13 +12,13 @@ from torch.nn import functional
 
 from loco_drake.common.determinism import single_thread
 from loco_drake.common.errors import InputError
+from loco_drake.common.weights import save_network
 from loco_drake.generation import speed_rank
 from loco_drake.generation.generator import (
     LONGEST,
     Generator,
     GeneratorConfig,
     duration_bin,
-    save_generator,
 )
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.stitching import Stitcher
@@ -148,7 +148,8 @@ def train_generator(
     if not result.stopped:
         record = {**training_record(library, settings), "stitched": stitched}
         info = {"robots": list(library.robots), "training": record}
-        save_generator(generator, Path(settings.out) / "generator.safetensors", info)
+        path = Path(settings.out) / "generator.safetensors"
+        save_network(path, "generator", generator, info, half=True)
     return generator, result
 
 

@@ -17,9 +17,10 @@ from torch.nn import functional
 from vector_quantize_pytorch import ResidualVQ
 
 from loco_drake.common.errors import InputError
+from loco_drake.common.weights import save_network
 from loco_drake.generation.features import CONTACTS
 from loco_drake.generation.loop_settings import LoopSettings
-from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig, save_tokenizer
+from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig
 from loco_drake.generation.tokenizer_score import Toes
 from loco_drake.generation.training import LoopResult, train
 from loco_drake.generation.training_motions import Clip, Library, training_record
@@ -190,7 +191,8 @@ def train_tokenizer(
             "labels": [str(label) for label in library.labels],
             "training": training_record(library, settings),
         }
-        save_tokenizer(tokenizer, Path(settings.out) / "tokenizer.safetensors", info)
+        path = Path(settings.out) / "tokenizer.safetensors"
+        save_network(path, "tokenizer", tokenizer, info, half=True)
     return tokenizer, result
 
 

@@ -10,10 +10,9 @@ from loco_drake.cli.evaluate_generation import EvaluateGeneration
 from loco_drake.cli.evaluate_tokenizer import EvaluateTokenizer
 from loco_drake.cli.train_classifier import TrainClassifier
 from loco_drake.common.errors import InputError
+from loco_drake.common.weights import save_network
 from loco_drake.evaluation.classifier import load_classifier
 from loco_drake.evaluation.recorded import retarget_recordings
-from loco_drake.generation.generator import save_generator
-from loco_drake.generation.tokenizer import save_tokenizer
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import save_motion
 from tests.synthetic import write_dog_recording
@@ -78,8 +77,8 @@ def save_weights(folder, model):
     paths = {
         name: folder / f"{name}.safetensors" for name in ("tokenizer", "generator")
     }
-    save_tokenizer(model.tokenizer, paths["tokenizer"], {})
-    save_generator(model.generator, paths["generator"], {})
+    save_network(paths["tokenizer"], "tokenizer", model.tokenizer, half=True)
+    save_network(paths["generator"], "generator", model.generator, half=True)
     return paths
 
 

@@ -11,8 +11,8 @@ import torch
 
 from loco_drake import __version__
 from loco_drake.cli.main import _COMMANDS, main
+from loco_drake.common.weights import save_network
 from loco_drake.control.actor import Actor, ActorConfig, save_actor
-from loco_drake.generation.tokenizer import save_tokenizer
 from loco_drake.models.shipped import pretrained_path
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion_file import save_motion
@@ -60,7 +60,7 @@ def files(tmp_path_factory):
     newer = tokenizer.replace(b'\\"format_version\\": 1', b'\\"format_version\\": 2')
     (folder / "next_tokenizer.safetensors").write_bytes(newer)
     other = folder / "other_tokenizer.safetensors"
-    save_tokenizer(make_tiny_model().tokenizer, other, {})
+    save_network(other, "tokenizer", make_tiny_model().tokenizer, half=True)
     return folder
 
 

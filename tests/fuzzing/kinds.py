@@ -97,13 +97,16 @@ def _policy(folder: Path) -> None:
 
 
 def _model(folder: Path) -> None:
-    from loco_drake.generation.generator import save_generator
-    from loco_drake.generation.tokenizer import save_tokenizer
+    from loco_drake.common.weights import save_network
     from tests.tiny_model import make_tiny_model
 
     model = make_tiny_model()
-    save_tokenizer(model.tokenizer, folder / "tokenizer.safetensors", {})
-    save_generator(model.generator, folder / "generator.safetensors", {})
+    save_network(
+        folder / "tokenizer.safetensors", "tokenizer", model.tokenizer, half=True
+    )
+    save_network(
+        folder / "generator.safetensors", "generator", model.generator, half=True
+    )
 
 
 def _references(folder: Path) -> None:

@@ -3,6 +3,7 @@ import pytest
 import torch
 
 from loco_drake.common.errors import InputError
+from loco_drake.common.weights import save_network
 from loco_drake.generation.generator import (
     DURATION_BINS,
     Generator,
@@ -10,7 +11,6 @@ from loco_drake.generation.generator import (
     draw,
     duration_bin,
     load_generator,
-    save_generator,
 )
 from loco_drake.generation.layers import turn_channels
 from loco_drake.generation.speed_rank import BINS
@@ -160,7 +160,7 @@ def test_durations_are_binned_on_a_log_scale_and_saturate():
 
 def test_saved_weights_come_back(generator, tmp_path):
     path = tmp_path / "g.safetensors"
-    save_generator(generator, path, {})
+    save_network(path, "generator", generator, half=True)
     loaded = load_generator(path)
     assert loaded.config == TINY
     before, labels, speed_bins, duration, codes = inputs()

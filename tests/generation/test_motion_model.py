@@ -6,6 +6,7 @@ import torch
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import quat_error, quat_rotate
+from loco_drake.common.weights import save_network
 from loco_drake.generation.generate import (
     SEVERAL,
     generate_motion,
@@ -14,7 +15,6 @@ from loco_drake.generation.generate import (
 from loco_drake.generation.motion_model import MotionModel, load_motion_model
 from loco_drake.generation.tokenizer import (
     Tokenizer,
-    save_tokenizer,
 )
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gait_schedule import parse_schedule
@@ -178,7 +178,7 @@ def test_networks_that_do_not_belong_together_are_refused(model, tmp_path):
         MotionModel(other, model.generator, "go2")
     with pytest.raises(InputError, match="weights for go2"):
         MotionModel(model.tokenizer, model.generator, "a1")
-    save_tokenizer(model.tokenizer, tmp_path / "t.safetensors", {})
+    save_network(tmp_path / "t.safetensors", "tokenizer", model.tokenizer, half=True)
     with pytest.raises(InputError, match="no generator weights"):
         load_motion_model(tmp_path / "t.safetensors", tmp_path / "g.safetensors", "go2")
 

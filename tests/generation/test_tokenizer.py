@@ -2,12 +2,12 @@ import pytest
 import torch
 
 from loco_drake.common.errors import InputError
+from loco_drake.common.weights import save_network
 from loco_drake.generation.features import CONTACTS, SIZE
 from loco_drake.generation.tokenizer import (
     Tokenizer,
     TokenizerConfig,
     load_tokenizer,
-    save_tokenizer,
 )
 from loco_drake.generation.train_tokenizer import LearningTokenizer
 
@@ -118,7 +118,7 @@ def test_memory_is_not_longer_than_needed(tokenizer):
 def test_normalization_is_part_of_the_weights(tokenizer, tmp_path):
     features = torch.randn(500, SIZE) * 3 + 5
     tokenizer.set_statistics(features)
-    save_tokenizer(tokenizer, tmp_path / "t.safetensors", {})
+    save_network(tmp_path / "t.safetensors", "tokenizer", tokenizer, half=True)
     loaded = load_tokenizer(tmp_path / "t.safetensors")
     torch.testing.assert_close(loaded.mean[0], torch.tensor(5.0), atol=0.5, rtol=0)
     torch.testing.assert_close(loaded.std[0], torch.tensor(3.0), atol=0.4, rtol=0)
@@ -126,7 +126,7 @@ def test_normalization_is_part_of_the_weights(tokenizer, tmp_path):
 
 def test_saved_in_16_bits_it_keeps_its_fingerprint(tokenizer, tmp_path):
     path = tmp_path / "t.safetensors"
-    save_tokenizer(tokenizer, path, {})
+    save_network(path, "tokenizer", tokenizer, half=True)
     loaded = load_tokenizer(path)
     assert loaded.config == TINY
     assert loaded.fingerprint == tokenizer.fingerprint
@@ -137,7 +137,7 @@ def test_saved_in_16_bits_it_keeps_its_fingerprint(tokenizer, tmp_path):
 
 def test_damaged_weights_are_refused(tokenizer, tmp_path):
     path = tmp_path / "t.safetensors"
-    save_tokenizer(tokenizer, path, {})
+    save_network(path, "tokenizer", tokenizer, half=True)
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(InputError, match="damaged"):
         load_tokenizer(path)

@@ -3,8 +3,9 @@ import pytest
 from loco_drake.cli.evaluation import trained_on
 from loco_drake.cli.train_generator import TrainGenerator
 from loco_drake.cli.train_tokenizer import TrainTokenizer
+from loco_drake.common.weights import save_network
 from loco_drake.evaluation.recorded import by_split
-from loco_drake.generation.tokenizer import load_tokenizer, save_tokenizer
+from loco_drake.generation.tokenizer import load_tokenizer
 from loco_drake.generation.training_motions import (
     read_training_record,
     seen_in_training,
@@ -52,7 +53,13 @@ def test_recordings_seen_in_training_are_named(weights, motions):
 
 def test_weights_without_a_record_load_and_say_so(weights, tmp_path):
     old = tmp_path / "old.safetensors"
-    save_tokenizer(load_tokenizer(weights["tokenizer"]), old, {"labels": []})
+    save_network(
+        old,
+        "tokenizer",
+        load_tokenizer(weights["tokenizer"]),
+        {"labels": []},
+        half=True,
+    )
     assert load_tokenizer(old).config == load_tokenizer(weights["tokenizer"]).config
     assert read_training_record(old, "tokenizer") is None
 
@@ -78,7 +85,9 @@ def test_evaluations_warn_of_recordings_that_were_learned_from(
     if learned is not None:
         info = {"training": {"recordings": {name: {} for name in learned}}}
     path = tmp_path / "tokenizer.safetensors"
-    save_tokenizer(load_tokenizer(weights["tokenizer"]), path, info)
+    save_network(
+        path, "tokenizer", load_tokenizer(weights["tokenizer"]), info, half=True
+    )
     assert trained_on({"tokenizer": path}, recorded, "go2") == {"tokenizer": seen}
     error = capsys.readouterr().err
     assert said in error
