@@ -72,7 +72,13 @@ class EvaluateGeneration(Effort, Evaluation):
         labels = self.labels or tuple(map(str, LABELS))
         model = other = None
         if self.motions is not None:
-            generated = cut_for_scoring(load_to_score(self.motions, robot, self.labels))
+            motions = load_to_score(self.motions, robot, self.labels)
+            generated = cut_for_scoring(motions)
+            if beyond := {str(m.label) for m in motions if m.label not in LABELS}:
+                say(
+                    f"Motions of {', '.join(sorted(beyond))} are left out of all "
+                    "comparisons, which are of the fifteen labels."
+                )
         else:
             model = load_motion_model(paths["tokenizer"], paths["generator"], name)
             known = known_labels(model, labels)

@@ -45,11 +45,7 @@ class ClassifierConfig:
 
 
 class GaitClassifier(nn.Module):
-    """Maps channels of :mod:`loco_drake.evaluation.samples` to logits of labels.
-
-    Args:
-        config: its sizes.
-    """
+    """Maps channels of :mod:`loco_drake.evaluation.samples` to logits of labels."""
 
     def __init__(self, config: ClassifierConfig) -> None:
         super().__init__()
@@ -133,12 +129,8 @@ def train_classifier(
 ) -> tuple[GaitClassifier, LoopResult]:
     """Trains a classifier and writes ``classifier.safetensors`` if it was not stopped.
 
-    All labels are seen equally often, and so are trajectories and their mirror images.
-
-    Args:
-        samples: of the labels in ``config``; others are not looked at.
-        config: sizes of the network.
-        settings: of the training.
+    Samples of labels that ``config`` lacks are left out. All labels are seen equally
+    often, and so are trajectories and their mirror images.
     """
     classes = class_indices(samples.labels, config.labels)
     samples, classes = samples[classes >= 0], classes[classes >= 0]
@@ -176,14 +168,10 @@ def class_indices(
     return np.array([names.index(k) if k in names else -1 for k in known])[labels]
 
 
-def fit_linear(features: Array, classes: NDArray[np.int64]) -> Pipeline:
-    """Fits a multinomial logistic regression on standardized features.
+def linear_classifier() -> Pipeline:
+    """Returns a multinomial logistic regression on standardized features.
 
-    Args:
-        features: shape (N, C).
-        classes: shape (N,); all weigh the same, however many rows each has.
+    All classes weigh the same, however many rows each has.
     """
-    return make_pipeline(
-        StandardScaler(),
-        LogisticRegression(C=1.0, class_weight="balanced", max_iter=3000),
-    ).fit(features, classes)
+    regression = LogisticRegression(C=1.0, class_weight="balanced", max_iter=3000)
+    return make_pipeline(StandardScaler(), regression)

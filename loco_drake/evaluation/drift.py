@@ -54,8 +54,8 @@ def drift(robot: Robot, motions: Sequence[Motion]) -> dict[str, Any]:
     """Returns the drift of each figure, of motions of one gait; see above.
 
     Args:
-        robot: that of the motions.
-        motions: two or more of different seeds, longer than 2 WINDOW.
+        robot: robot of the motions.
+        motions: two or more motions of different seeds, longer than 2 WINDOW.
 
     Returns:
         For each figure its means in the first and last WINDOW seconds, the share of
@@ -140,34 +140,27 @@ def _turn(motion: Motion) -> float:
 
 
 def worst(drifts: dict[str, dict[str, Any]]) -> dict[str, Any] | None:
-    """Returns label, figure and drift of the worst; None if nothing was measured.
-
-    Args:
-        drifts: by label, from :func:`drift`.
-    """
-    found = [
-        (figures["drift"], label, name)
+    """Returns the worst of :func:`drift` by label; None if nothing was measured."""
+    found = (
+        {"drift": figures["drift"], "label": label, "figure": name}
         for label, by_name in drifts.items()
         for name, figures in by_name.items()
-    ]
-    keys = ("drift", "label", "figure")
-    return dict(zip(keys, max(found), strict=True)) if found else None
+    )
+    return max(found, key=lambda each: tuple(each.values()), default=None)
 
 
 def _table(robot: Robot, windows: Sequence[Motion]) -> Array:
     """Returns the figures of each window, NaN for those that it does not have."""
-    rows = []
-    for motion in windows:
-        slip = stance_slip_median(
-            toe_trajectories(motion, robot), robot.foot_radius, motion.fps
+    rows = [
+        (
+            mean_speed(robot, motion),
+            motion.base_position[:, 2].mean(),
+            _turn(motion) / motion.duration,
+            stride_period(motion_track(motion, robot)),
+            stance_slip_median(
+                toe_trajectories(motion, robot), robot.foot_radius, motion.fps
+            ),
         )
-        rows.append(
-            [
-                mean_speed(robot, motion),
-                float(motion.base_position[:, 2].mean()),
-                _turn(motion) / motion.duration,
-                stride_period(motion_track(motion, robot)),
-                slip,
-            ]
-        )
+        for motion in windows
+    ]
     return np.array(rows, dtype=np.float64)

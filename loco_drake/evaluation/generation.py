@@ -27,6 +27,7 @@ from loco_drake.evaluation.samples import (
     FRAMES,
     SUMMARY,
     Samples,
+    by_label,
     cut,
     join,
     label_weights,
@@ -61,15 +62,8 @@ def score_generation(
     """Compares generated with recorded motion of one robot.
 
     Only labels with training and validation recordings and generated motion are
-    compared.
-
-    Args:
-        robot: that of all motions.
-        recorded: whole stretches.
-        generated: what is scored.
-        effort: how many classifiers are trained, and how long.
-        seed: of the first classifier; all else that is random follows it.
-        say: is told what goes on.
+    compared. All that is random follows ``seed``; ``say`` receives messages about the
+    progress.
 
     Returns:
         The figures, as JSON; what the classifiers did, by their kind.
@@ -93,7 +87,6 @@ def score_generation(
         "transformer": partial(TransformerRecognizer, steps=effort.steps),
         "linear": linear_recognizer,
     }
-    reason: dict[str, str] = {}
     with threadpool_limits(1):  # the same figures on any machine
         of_train = make_samples(robot, cut_train)
         of_validation = make_samples(robot, cut_validation)
@@ -118,13 +111,14 @@ def score_generation(
             **_nearest(train, cut_train, cut_validation, sets),
             **_drift(robot, generated.long, recorded),
             **_by_label(robot, recorded, generated),
-            "reason": reason,
         }
-    for name in ("two_sample_accuracy", "two_sample_accuracy_real_real"):
-        if figures[name] is None:
-            reason[name] = f"Fewer than {FOLDS} subjects on a side."
-    if figures["drift_60s"] is None:
-        reason["drift_60s"] = "No label has two motions of a minute."
+    few = f"Fewer than {FOLDS} subjects on a side."
+    reasons = {
+        "two_sample_accuracy": few,
+        "two_sample_accuracy_real_real": few,
+        "drift_60s": "No label has two motions of a minute.",
+    }
+    figures["reason"] = {k: v for k, v in reasons.items() if figures[k] is None}
     return figures, recognition
 
 
@@ -150,8 +144,8 @@ def _two_sample(
     """Returns the two-sample tests: of all recordings, and of parts of the summary."""
     real = join((train, validation))
 
-    def test(a: Samples, b: Samples, fit: str = "linear") -> dict[str, float] | None:
-        estimate = two_sample_accuracy(a, b, seeds, fit)
+    def test(a: Samples, b: Samples, kind: str = "linear") -> dict[str, float] | None:
+        estimate = two_sample_accuracy(a, b, seeds, kind)
         return None if estimate is None else asdict(estimate)
 
     def part(samples: Samples, columns: slice) -> Samples:
@@ -228,11 +222,11 @@ def _drift(
         if len(motions) > 1
     }
     worst = drifting.worst(drifts)
-    beyond = {}
-    for label in drifts:
-        real = [motion for motion in recorded.of(label) if len(motion) >= FRAMES]
-        if real:
-            beyond[label] = drifting.beyond_recorded(long[label], real)
+    beyond = {
+        label: drifting.beyond_recorded(long[label], real)
+        for label in drifts
+        if (real := [motion for motion in recorded.of(label) if len(motion) >= FRAMES])
+    }
     return {
         "drift_60s": None if worst is None else worst["drift"],
         "drift": {"worst": worst, "labels": drifts, "beyond_recorded": beyond},
@@ -241,24 +235,16 @@ def _drift(
 
 def _by_label(robot: Robot, recorded: Recorded, generated: Generated) -> dict[str, Any]:
     """Returns the figures of each label, of all and of labels beyond the fifteen."""
-    known = {str(label) for label in LABELS}
-    by_label: dict[str, list[Motion]] = {}
-    for motion in (m for each in generated.sets for m in each):
-        by_label.setdefault(str(motion.label), []).append(motion)
-    measured = {name: measure(robot, motions) for name, motions in by_label.items()}
+    motions = by_label(motion for each in generated.sets for motion in each)
+    measured = {name: measure(robot, own) for name, own in motions.items()}
     figures = {}
-    for name, of_generated in measured.items():
+    for name, own in measured.items():
         stretches = recorded.of(name)
-        of_recordings = (
-            measure(robot, cut(stretches) or stretches) if stretches else None
-        )
-        figures[name] = compare(of_generated, of_recordings)
-    ordered = [str(label) for label in LABELS if str(label) in figures]
+        real = measure(robot, cut(stretches) or stretches) if stretches else None
+        figures[name] = compare(own, real)
+    known = {name: figures[name] for name in map(str, LABELS) if name in figures}
     return {
-        "labels": {name: figures[name] for name in ordered},
-        "all": overall(
-            {name: figures[name] for name in ordered},
-            [measured[name] for name in ordered],
-        ),
-        "other": {k: v for k, v in figures.items() if k not in known},
+        "labels": known,
+        "all": overall(known, [measured[name] for name in known]),
+        "other": {name: own for name, own in figures.items() if name not in known},
     }

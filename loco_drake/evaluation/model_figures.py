@@ -13,7 +13,7 @@ from loco_drake.evaluation.effort import Effort
 from loco_drake.evaluation.generation import Generated
 from loco_drake.evaluation.motion_scores import NULL_FIGURES
 from loco_drake.evaluation.recorded import Recorded
-from loco_drake.evaluation.samples import FRAMES, SECONDS, cut
+from loco_drake.evaluation.samples import FRAMES, SECONDS, by_label, cut
 from loco_drake.evaluation.tokenizer import pair_up, transfer_rmse
 from loco_drake.generation.generate import generate_motion, generate_motions
 from loco_drake.generation.motion_model import MotionModel
@@ -45,20 +45,20 @@ def generate_for_scoring(
     model: MotionModel, labels: Sequence[GaitLabel], effort: Effort, seed: int
 ) -> Generated:
     """Generates what is scored, of labels that the model knows."""
-    sets: list[list[Motion]] = [[] for _ in range(effort.generator_seeds)]
-    long = {}
-    for label in labels:
-        for number, motions in enumerate(sets):
-            first = seed + number * effort.count
-            # A motion of 2 s ends with one frame more than 2 s of frames.
-            made = generate_motions(
-                model, label, SECONDS, range(first, first + effort.count)
-            )
-            motions += [motion.slice(0, FRAMES) for motion in made]
-        if effort.minutes > 1:
-            seeds = range(seed, seed + effort.minutes)
-            long[str(label)] = generate_motions(model, label, drifting.SECONDS, seeds)
-    return Generated(tuple(map(tuple, sets)), long)
+
+    def generate(seconds: float, first: int, count: int) -> list[Motion]:
+        seeds = range(first, first + count)
+        made = [generate_motions(model, label, seconds, seeds) for label in labels]
+        return [motion for own in made for motion in own]
+
+    sets = []
+    for number in range(effort.generator_seeds):
+        made = generate(SECONDS, seed + number * effort.count, effort.count)
+        # A motion of 2 s ends with one frame more than 2 s of frames.
+        sets.append(tuple(motion.slice(0, FRAMES) for motion in made))
+    minutes = effort.minutes > 1
+    long = generate(drifting.SECONDS, seed, effort.minutes) if minutes else []
+    return Generated(tuple(sets), by_label(long))
 
 
 def cut_for_scoring(motions: Sequence[Motion]) -> Generated:
@@ -70,10 +70,7 @@ def cut_for_scoring(motions: Sequence[Motion]) -> Generated:
     cuts = cut(motions)
     if not cuts:
         raise InputError(f"No motion to score is {SECONDS:g} s long or longer.")
-    long: dict[str, list[Motion]] = {}
-    for motion in motions:
-        if motion.duration >= drifting.SECONDS:
-            long.setdefault(str(motion.label), []).append(motion)
+    long = by_label(m for m in motions if m.duration >= drifting.SECONDS)
     return Generated((tuple(cuts),), long)
 
 
@@ -87,12 +84,11 @@ def add_model_figures(
     """Adds to the figures of motion those of the model that wrote it.
 
     Args:
-        figures: from :func:`.generation.score_generation`.
-        model: None if Motion files were scored.
-        labels: asked for; the model need not know all.
-        recorded: of the model's robot.
-        other_robot: the same recordings retargeted to the other robot, if the
-            tokenizer knows it.
+        figures: figures from :func:`.generation.score_generation`.
+        model: the model; None if Motion files were scored.
+        labels: requested labels; the model need not know all.
+        recorded: recordings retargeted to the model's robot.
+        other_robot: the same retargeted to the other robot, if the tokenizer knows it.
     """
     reasons = figures["reason"]
     for name in ("transfer_joint_rmse_rad", "real_time_factor"):

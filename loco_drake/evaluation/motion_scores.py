@@ -17,7 +17,7 @@ labels together: the median of the pooled speeds, the deepest, the geometric mea
 the jerk ratios, the means of the two speed figures over labels.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,12 +37,9 @@ from loco_drake.motion.quality import (
 Array = NDArray[np.float64]
 
 # Of a label without generated motion.
-NULL_FIGURES: dict[str, Any] = {
-    "stance_slip_median_mps": None,
-    "penetration_max_m": None,
-    "jerk_ratio": None,
-    "speed_error_mps": None,
-}
+NULL_FIGURES: dict[str, Any] = dict.fromkeys(
+    ("stance_slip_median_mps", "penetration_max_m", "jerk_ratio", "speed_error_mps")
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,15 +55,14 @@ class Measured:
 
 def measure(robot: Robot, motions: Sequence[Motion]) -> Measured:
     """Returns the figures of one or more motions of one robot."""
-    toes = [toe_trajectories(motion, robot) for motion in motions]
-    radius = robot.foot_radius
-    slips = [
-        stance_slip_speeds(p_WF, radius, motion.fps)
-        for p_WF, motion in zip(toes, motions, strict=True)
-    ]
+    slips, depths = [], []
+    for motion in motions:
+        p_WF = toe_trajectories(motion, robot)
+        slips.append(stance_slip_speeds(p_WF, robot.foot_radius, motion.fps))
+        depths.append(penetration_max(p_WF, robot.foot_radius))
     return Measured(
         slip_speeds=np.concatenate(slips),
-        penetration=max(penetration_max(p_WF, radius) for p_WF in toes),
+        penetration=max(depths),
         jerk=joint_jerk(motions),
         speeds=np.array([mean_speed(robot, motion) for motion in motions]),
     )
@@ -87,11 +83,7 @@ def mean_speed(robot: Robot, motion: Motion) -> float:
 
 def compare(generated: Measured, recorded: Measured | None) -> dict[str, Any]:
     """Returns the figures of a label; those that need recordings may be None."""
-    figures = {
-        **NULL_FIGURES,
-        "speed_distance_mps": None,
-        **_of_one_side(generated),
-    }
+    figures = {**NULL_FIGURES, "speed_distance_mps": None, **_of_one_side(generated)}
     if recorded is None:
         return {**figures, "reason": "There are no recordings of this label."}
     if generated.jerk is not None and recorded.jerk:
@@ -128,15 +120,14 @@ def overall(
     """
     slips = np.concatenate([np.empty(0), *(m.slip_speeds for m in measured)])
 
-    def values(key: str) -> list[float]:
-        return [f[key] for f in labels.values() if f.get(key) is not None]
+    def average(key: str, mean: Callable[[list[float]], Any] = np.mean) -> float | None:
+        values = [f[key] for f in labels.values() if f.get(key) is not None]
+        return float(mean(values)) if values else None
 
-    jerk = values("jerk_ratio")
-    error, distance = values("speed_error_mps"), values("speed_distance_mps")
     return {
         "stance_slip_median_mps": median(slips),
         "penetration_max_m": max((m.penetration for m in measured), default=None),
-        "jerk_ratio": float(gmean(jerk)) if jerk else None,
-        "speed_error_mps": float(np.mean(error)) if error else None,
-        "speed_distance_mps": float(np.mean(distance)) if distance else None,
+        "jerk_ratio": average("jerk_ratio", gmean),
+        "speed_error_mps": average("speed_error_mps"),
+        "speed_distance_mps": average("speed_distance_mps"),
     }

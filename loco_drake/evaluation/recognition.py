@@ -25,13 +25,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn import metrics
 
 from loco_drake.evaluation.classifier import (
     LEARNING_RATE,
     STEPS,
     ClassifierConfig,
     GaitClassifier,
-    fit_linear,
+    linear_classifier,
     predict,
     train_classifier,
 )
@@ -58,27 +59,16 @@ Fit = Callable[[Samples, int], Recognizer]
 
 def linear_recognizer(samples: Samples, seed: int = 0) -> Recognizer:
     """Fits a multinomial logistic regression to the summaries, deterministically."""
-
-    def features(of: Samples) -> Array:
-        return of.summaries.reshape(2 * len(of), -1)
-
-    fitted = fit_linear(features(samples), np.repeat(samples.labels, 2))
-    return lambda tested: fitted.predict(features(tested)).reshape(-1, 2)
+    fitted = linear_classifier().fit(samples.rows, np.repeat(samples.labels, 2))
+    return lambda tested: fitted.predict(tested.rows).reshape(-1, 2)
 
 
 class TransformerRecognizer:
-    """The transformer of :mod:`loco_drake.evaluation.classifier`.
-
-    Args:
-        samples: to learn from.
-        seed: of its weights and batches.
-        steps: of the optimizer.
-    """
+    """Trains the transformer of :mod:`.classifier` on samples."""
 
     def __init__(self, samples: Samples, seed: int = 0, steps: int = STEPS) -> None:
-        present = np.unique(samples.labels)
-        names = tuple(str(LABELS[label]) for label in present)
-        self._labels = present
+        self._labels = np.unique(samples.labels)
+        names = tuple(str(LABELS[label]) for label in self._labels)
         with tempfile.TemporaryDirectory() as folder:
             settings = LoopSettings(
                 out=Path(folder), steps=steps, learning_rate=LEARNING_RATE, seed=seed
@@ -134,15 +124,15 @@ def recognize(
         fit: kind of classifier.
         train: recordings to train on.
         validation: recordings of other subjects, of the same labels.
-        generated: one set or several; with one seed after the other, a classifier
-            learns from one set after the other.
-        seeds: of the classifiers, one run each.
-        say: is told what goes on.
+        generated: sets of generated motion; run by run, a classifier learns from the
+            next of them.
+        seeds: seeds of the classifiers, one for each run.
+        say: receives messages about the progress.
     """
     everything = join(generated)
     counts = count_per_label(train)
     of_recordings = []
-    runs: list[dict[str, Labels]] = []
+    answers: dict[str, list[Labels]] = {}
     for run, seed in enumerate(seeds):
         place = f"run {run + 1} of {len(seeds)}:"
         say(f"{place} learning from recordings")
@@ -156,19 +146,19 @@ def recognize(
             "generated_to_real": fit(own, seed)(validation),
         }
         few = choose_per_label(own, counts, np.random.default_rng(seed))
-        matched = found["generated_to_real"]
+        found["generated_to_real_matched"] = found["generated_to_real"]
         if len(few) < len(own):
             say(f"{place} ... of as many trajectories")
-            matched = fit(few, seed)(validation)
-        runs.append({**found, "generated_to_real_matched": matched})
-    labels = np.unique(validation.labels)
+            found["generated_to_real_matched"] = fit(few, seed)(validation)
+        for row, labels in found.items():
+            answers.setdefault(row, []).append(labels)
+    present = np.unique(validation.labels)
     accuracies, confusion = {}, {}
-    for row in runs[0]:
-        answers = np.stack([found[row] for found in runs])
+    for row, runs in answers.items():
         tested = everything if row == "real_to_generated" else validation
-        accuracies[row] = _accuracies(answers, tested)
-        confusion[row] = confusion_matrix(answers, tested.labels, labels)
-    return Recognition(accuracies, confusion, labels, tuple(of_recordings))
+        accuracies[row] = _accuracies(np.stack(runs), tested)
+        confusion[row] = confusion_matrix(np.stack(runs), tested.labels, present)
+    return Recognition(accuracies, confusion, present, tuple(of_recordings))
 
 
 def _accuracies(answers: Labels, tested: Samples) -> dict[str, Estimate]:
@@ -188,16 +178,14 @@ def _accuracies(answers: Labels, tested: Samples) -> dict[str, Estimate]:
 
 
 def confusion_matrix(answers: Labels, truth: Labels, labels: Labels) -> Array:
-    """Returns a confusion matrix; rows are true labels and sum to 1.
+    """Returns a confusion matrix (L, L); rows are true labels and sum to 1.
 
     Args:
         answers: indices into LABELS, shape (runs, N, 2).
         truth: the same, shape (N,).
-        labels: of rows and columns, shape (L,).
+        labels: labels of rows and columns, shape (L,).
     """
-    matrix = np.zeros((len(labels), len(labels)))
-    for row, label in enumerate(labels):
-        given = answers[:, truth == label]
-        if given.size:
-            matrix[row] = [(given == other).mean() for other in labels]
-    return matrix
+    true = np.broadcast_to(truth[:, None], answers.shape)
+    return metrics.confusion_matrix(
+        true.ravel(), answers.ravel(), labels=labels, normalize="true"
+    )

@@ -1,6 +1,6 @@
 """Recorded motion of a robot as reference, split into training and validation sets."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -44,16 +44,10 @@ class Recorded:
 def retarget_recordings(
     data_dir: Path, robot: Robot, labels: Iterable[str] = (), workers: int = 1
 ) -> Recorded:
-    """Retargets the recordings of the fifteen labels.
-
-    Args:
-        data_dir: holds ``segments.csv``.
-        robot: to move.
-        labels: only these; default: all of the fifteen that there are.
-        workers: processes.
+    """Retargets the recordings of ``labels``, by default of all fifteen.
 
     Raises:
-        InputError: if the folder is unsound, or has nothing of a label.
+        InputError: if ``segments.csv`` in the folder is unsound, or lacks a label.
     """
     segments = read_segments(data_dir)
     names = {str(label) for label in LABELS}
@@ -77,12 +71,14 @@ def by_split(
 
     Motions without one are in the training set.
     """
-    held = [m.provenance.get("split") == VALIDATION for m in motions]
-    return Recorded(
-        train=tuple(m for m, out in zip(motions, held, strict=True) if not out),
-        validation=tuple(m for m, out in zip(motions, held, strict=True) if out),
-        failed=failed or {},
-    )
+    sides: dict[bool, list[Motion]] = {False: [], True: []}
+    for motion in motions:
+        sides[motion.provenance.get("split") == VALIDATION].append(motion)
+    return Recorded(tuple(sides[False]), tuple(sides[True]), failed or {})
+
+
+def _load(folder: Path) -> Iterator[Motion]:
+    return map(load_motion, sorted(Path(folder).rglob("*.npz")))
 
 
 def load_to_score(
@@ -95,7 +91,7 @@ def load_to_score(
     """
     motions = [
         motion
-        for motion in map(load_motion, sorted(folder.rglob("*.npz")))
+        for motion in _load(folder)
         if motion.robot == robot.name and (not labels or str(motion.label) in labels)
     ]
     if not motions:
@@ -121,9 +117,7 @@ def load_recorded(folder: Path) -> tuple[Robot, Recorded]:
     Raises:
         InputError: if there are none, or of several robots, or one is unsound.
     """
-    folder = Path(folder)
-    motions = [load_motion(path) for path in sorted(folder.rglob("*.npz"))]
-    motions = [motion for motion in motions if motion.label in LABELS]
+    motions = [motion for motion in _load(folder) if motion.label in LABELS]
     robots = sorted({motion.robot for motion in motions})
     if len(robots) != 1:
         found = f"of {', '.join(robots)}" if robots else "none"

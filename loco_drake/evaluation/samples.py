@@ -3,16 +3,20 @@
 All comparisons of recorded with generated motion use them. They are computed from base
 and joints; contact labels, which a generator also produces, are excluded.
 
-Channels     Those of :mod:`loco_drake.generation.features` up to the joints: velocity
-of the     base in its heading frame, yaw rate, height, roll, pitch, twelve joint
-angles. Summary     For each channel its mean and standard deviation over time, and the
-root mean squares     of its first and second differences; then the correlations of the
-six pairs of thigh     angles, which distinguish a pace from a trot. All are rounded to
-RESOLUTION, since a     roll of exactly zero does not differ from one of 1e-5 rad.
-Mirror image     Left and right are chance in recordings, and generators are trained
-with mirror     images. Each trajectory and its mirror image therefore count one half.
+============ ==========================================================================
+channels     those of :mod:`loco_drake.generation.features` up to the joints: velocity
+             of the base in its heading frame, yaw rate, height, roll, pitch, twelve
+             joint angles
+summary      mean and standard deviation of each channel over time, root mean squares of
+             its first and second differences, and the correlations of the six pairs of
+             thigh angles, which distinguish a pace from a trot; rounded to RESOLUTION,
+             since a roll of exactly zero does not differ from one of 1e-5 rad
+mirror image left and right are chance in recordings, and generators are trained with
+             mirror images, so each trajectory and its mirror image count one half
+============ ==========================================================================
 """
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -71,15 +75,16 @@ class Samples:
         """Returns those that a mask or indices choose."""
         return Samples(*(column[index] for column in vars(self).values()))
 
+    @property
+    def rows(self) -> Array:
+        """Summaries of trajectories, each before its mirror image, shape (2 N, ...)."""
+        return self.summaries.reshape(2 * len(self), -1)
+
 
 def make_samples(robot: Robot, motions: Sequence[Motion]) -> Samples:
-    """Returns trajectories as samples; frames after the first FRAMES are left out.
+    """Returns the first FRAMES frames of motions of the fifteen labels as samples.
 
     Motions without a subject in their provenance are subjects of their own.
-
-    Args:
-        robot: that of the motions.
-        motions: at least FRAMES frames each, of one of the fifteen labels.
     """
     channels = np.empty((len(motions), 2, FRAMES, CHANNELS))
     for i, motion in enumerate(motions):
@@ -107,6 +112,14 @@ def subject_of(motion: Motion) -> str | None:
 def cut(motions: Iterable[Motion]) -> list[Motion]:
     """Returns all trajectories of motions, in their order."""
     return [part for motion in motions for part in trajectories(motion)]
+
+
+def by_label(motions: Iterable[Motion]) -> dict[str, list[Motion]]:
+    """Returns the motions of each label, in their order."""
+    found: dict[str, list[Motion]] = {}
+    for motion in motions:
+        found.setdefault(str(motion.label), []).append(motion)
+    return found
 
 
 def join(parts: Sequence[Samples]) -> Samples:
@@ -149,17 +162,16 @@ def label_weights(labels: NDArray[np.int64]) -> Array:
 
 
 def choose_per_label(
-    samples: Samples, counts: dict[int, int], random: np.random.Generator
+    samples: Samples, counts: Counter[int], random: np.random.Generator
 ) -> Samples:
     """Returns at most ``counts[label]`` samples of each label, drawn at random."""
-    chosen = []
-    for label in np.unique(samples.labels):
-        rows = random.permutation(np.flatnonzero(samples.labels == label))
-        chosen.append(rows[: counts.get(int(label), 0)])
+    chosen = [
+        random.permutation(np.flatnonzero(samples.labels == label))[: counts[label]]
+        for label in np.unique(samples.labels).tolist()
+    ]
     return samples[np.sort(np.concatenate(chosen))]
 
 
-def count_per_label(samples: Samples) -> dict[int, int]:
+def count_per_label(samples: Samples) -> Counter[int]:
     """Returns how many samples there are of each label."""
-    labels, counts = np.unique(samples.labels, return_counts=True)
-    return {int(k): int(n) for k, n in zip(labels, counts, strict=True)}
+    return Counter(samples.labels.tolist())

@@ -39,23 +39,18 @@ def evaluate_tokenizer(
     """Returns the figures, and how often each code of each codebook is used.
 
     Args:
-        tokenizer: knows the recordings' robot.
+        tokenizer: tokenizer that knows the recordings' robot.
         recorded: whole stretches.
-        codebooks: decodes from the coarsest so many; None: all.
+        codebooks: number of codebooks to decode from, the coarsest first; None: all.
 
     Returns:
         "labels" and "all" of recordings held out, the same under "train",
         "codebook_use" and "books", the share that is used of each; the counts have
         shape (codebooks, codebook_size).
     """
-    train, held_out = (
-        [motion_clip(motion) for motion in side]
-        for side in (recorded.train, recorded.validation)
-    )
-    mirrors = [
-        motion_clip(motion.mirrored())
-        for motion in (*recorded.train, *recorded.validation)
-    ]
+    sides = recorded.train, recorded.validation
+    train, held_out = ([motion_clip(motion) for motion in side] for side in sides)
+    mirrors = [motion_clip(motion.mirrored()) for side in sides for motion in side]
     counts = code_counts(tokenizer, [*train, *held_out, *mirrors]).numpy()
     used = (counts > 0).mean(axis=1)
     figures = {

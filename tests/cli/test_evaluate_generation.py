@@ -163,10 +163,10 @@ def test_recordings_scored_as_if_generated_get_good_figures(
     assert noisy["nearest_training_rad"] == pytest.approx(0.017, rel=0.2)
 
 
-def test_other_labels_and_motions_of_a_minute(recordings, recorded, tmp_path):
+def test_other_labels_and_motions_of_a_minute(recordings, recorded, tmp_path, capsys):
     """Labels beyond the fifteen are scored apart; long motions tell the drift."""
     motions = [as_generated(motion) for motion in recorded.train]
-    motions.append(replace(motions[0], gait="turn_left"))
+    motions += [replace(motions[0], gait=gait) for gait in ("turn_left", "jump")]
     motions += [synthetic_motion("dog-pace", 60.0, speed) for speed in (0.8, 0.82)]
     for number, motion in enumerate(motions):
         save_motion(motion, tmp_path / "motions" / f"{number}.npz")
@@ -174,7 +174,9 @@ def test_other_labels_and_motions_of_a_minute(recordings, recorded, tmp_path):
         tmp_path, motions=tmp_path / "motions", data_dir=recordings, steps=1
     )
     assert set(result["labels"]) == {"dog-pace", "dog-trot"}
-    assert set(result["other"]) == {"dog-turn_left"}
+    assert set(result["other"]) == {"dog-turn_left", "dog-jump"}
+    (line,) = [k for k in capsys.readouterr().err.splitlines() if "left out" in k]
+    assert line.startswith("go2: Motions of dog-jump, dog-turn_left are left out")
     assert result["other"]["dog-turn_left"]["jerk_ratio"] is None
     assert set(result["drift"]["labels"]) == {"dog-pace"}
     assert result["drift_60s"] == result["drift"]["worst"]["drift"] < 1
