@@ -16,8 +16,7 @@ import tyro
 from loco_drake.evaluation.gait_change import forward_speed, roughness
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
-from loco_drake.motion.gait_schedule import GaitSchedule
-from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.gaits import LABELS, GaitSchedule
 from loco_drake.motion.motion import FPS
 
 BEFORE, AFTER = 3.0, 3.0  # s of a gait before and after the change

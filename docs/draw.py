@@ -35,8 +35,7 @@ from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.ground import AddGround
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS, AddRobotModel, get_robot
-from loco_drake.motion.gait_schedule import parse_schedule
-from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.gaits import LABELS, parse_schedule
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.motion_file import load_motion
 from loco_drake.retargeting.retarget import retarget_clip

@@ -15,8 +15,7 @@ from loco_drake.generation.motion_model import (
     pretrained_motion_model,
 )
 from loco_drake.models.robots import Robot
-from loco_drake.motion.gait_schedule import GaitSchedule, parse_schedule
-from loco_drake.motion.gaits import LABELS, GaitLabel
+from loco_drake.motion.gaits import LABELS, GaitLabel, GaitSchedule, parse_schedule
 
 from .plan_producer import PlanProducer
 from .scenario import GeneratedReference

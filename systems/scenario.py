@@ -17,7 +17,7 @@ from loco_drake.common.typed_yaml import refuse_repeated_keys
 from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS
-from loco_drake.motion.gait_schedule import parse_schedule
+from loco_drake.motion.gaits import parse_schedule
 
 # Limits of a scenario's text: the loader recurses at each bracket and copies at each
 # alias.

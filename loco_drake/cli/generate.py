@@ -6,7 +6,7 @@ from pathlib import Path
 
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import check_at_least, check_choice
-from loco_drake.motion.gait_schedule import parse_schedule
+from loco_drake.motion.gaits import parse_schedule
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.motion_file import save_motion
 

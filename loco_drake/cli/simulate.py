@@ -11,7 +11,7 @@ import tyro
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import atomic_path
-from loco_drake.motion.gait_schedule import parse_schedule
+from loco_drake.motion.gaits import parse_schedule
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.motion_file import load_motion
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from loco_drake.generation.features import VELOCITY, motion_features
 from loco_drake.models.robots import Robot
-from loco_drake.motion.gait_schedule import GaitSchedule
+from loco_drake.motion.gaits import GaitSchedule
 from loco_drake.motion.motion import Motion
 
 Array = NDArray[np.float64]

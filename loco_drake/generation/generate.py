@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError, check_bounds
 from loco_drake.generation.motion_model import MotionModel
-from loco_drake.motion.gait_schedule import GaitSchedule
-from loco_drake.motion.gaits import ROW_LABELS, GaitLabel
+from loco_drake.motion.gaits import ROW_LABELS, GaitLabel, GaitSchedule
 from loco_drake.motion.motion import FPS, Motion
 
 Integers = NDArray[np.int64]

@@ -9,6 +9,7 @@ joint speeds reach a fifth.
 
 from dataclasses import replace
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,12 @@ GROUND_MARGIN = 0.1  # stand heights from the lowest sole to the ground
 STANCE_SPEED = 0.01  # m/s of toes in stance; above, other conventions are tried
 MAX_UNKNOWN_JOINT_SPEED = 200.0  # rad/s, for a robot with unknown limits
 
+_INTEGRALS = {
+    "base_velocity": "base_position, in m/s in the world's frame",
+    "base_angular_velocity": "base_quaternion, in rad/s in the world's frame",
+    "joint_velocities": "joint_positions, in rad/s",
+}
+_XYZW = [3, 0, 1, 2]
 _DOUBT = 0.2  # of what is rounding
 _TINY = 1e-9
 _MOST_LATE = 10  # frames that velocities may be found to lag; up to 2 are a filter's
@@ -90,15 +97,15 @@ def check_conventions(motion: Motion) -> None:
     robot = get_robot(motion.robot) if motion.robot in ROBOTS else None
     if robot is not None:
         _check_joints(motion, robot)
-    steps = (
+    _check_speeds(
+        robot,
         np.diff(motion.base_position, axis=0) * motion.fps,
         angular_velocity(quat_continuous(motion.base_quaternion), 1 / motion.fps),
         np.diff(motion.joint_positions, axis=0) * motion.fps,
     )
-    _check_speeds(robot, *steps)
     _check_velocities(motion)
-    given = (motion.base_velocity, motion.base_angular_velocity)
-    _check_speeds(robot, *given, motion.joint_velocities)
+    given = motion.base_velocity, motion.base_angular_velocity, motion.joint_velocities
+    _check_speeds(robot, *given)
     if robot is not None:
         _check_feet(motion, robot)
 
@@ -123,7 +130,7 @@ def _check_speeds(
     robot: Robot | None, base: Array, turning: Array, joints: Array
 ) -> None:
     """Raises InputError if velocities (N, 3), (N, 3) or (N, J) are implausible."""
-    most: Array = np.full(joints.shape[1], MAX_UNKNOWN_JOINT_SPEED)
+    most: float | Array = MAX_UNKNOWN_JOINT_SPEED
     if robot is not None:
         most = MAX_JOINT_SPEED * robot.joint_speed_limits
     for what, unit, values, bound in (
@@ -145,61 +152,47 @@ def _check_velocities(motion: Motion) -> None:
     deviations are refused if another convention explains most of them.
     """
     fps, q = motion.fps, quat_continuous(motion.base_quaternion)
-    xyzw = quat_continuous(motion.base_quaternion[:, [3, 0, 1, 2]])
+    xyzw = quat_continuous(motion.base_quaternion[:, _XYZW])
     turning = angular_velocity(q, 1 / fps)[1:-1]
     base = np.gradient(motion.base_position, 1 / fps, axis=0)[1:-1]
     joints = np.gradient(motion.joint_positions, 1 / fps, axis=0)[1:-1]
+    to_trunk = quat_conjugate(q)[1:-1]
+    others = {"in the trunk's frame": quat_rotate(to_trunk, base)}
     factor = _rms(motion.base_velocity[1:-1]) / max(_rms(base), _TINY)
     # Differences of what is fast are a little too small, which is no other rate.
-    other_rate = factor > _TINY and abs(np.log(factor)) > 0.15
-    rates = {f"at {factor * fps:.3g} frames/s": factor * base} if other_rate else {}
-    to_trunk = quat_conjugate(q)[1:-1]
-    for name, of, unit, rounding, true, others in (
-        (
-            "base_velocity",
-            "base_position",
-            "m/s in the world's frame",
-            0.02,
-            base,
-            {"in the trunk's frame": quat_rotate(to_trunk, base), **rates},
-        ),
-        (
-            "base_angular_velocity",
-            "base_quaternion",
-            "rad/s in the world's frame",
-            0.05,
-            turning,
-            {
-                "in the trunk's frame": quat_rotate(to_trunk, turning),
-                "in degrees": np.degrees(turning),
-                "with quaternions x, y, z, w": angular_velocity(xyzw, 1 / fps)[1:-1],
-            },
-        ),
-        (
-            "joint_velocities",
-            "joint_positions",
-            "rad/s",
-            0.1,
-            joints,
-            {"in degrees": np.degrees(joints)},
-        ),
-    ):
-        given = getattr(motion, name)[1:-1]
-        off, speed = _rms(given - true), _rms(true)
-        others |= {"all zero": np.zeros_like(true), "in reverse": true[::-1]}
-        for late in (k for k in range(-_MOST_LATE, _MOST_LATE + 1) if abs(k) > 2):
-            moved = np.roll(true, late, axis=0)
-            ends = slice(late) if late > 0 else slice(late, None)
-            moved[ends] = given[ends]  # of which nothing is known
-            others[f"{late} frames late"] = moved
-        best = min(others, key=lambda how: _rms(given - others[how]))
-        found = _rms(given - others[best]) < off / 4
-        far = np.abs(given - true).max() > 0.5 * np.abs(true).max() + 5 * rounding
-        if far or off > 0.5 * speed + rounding or (found and off > _DOUBT * rounding):
-            raise InputError(
-                f"The values of {name} are not the derivatives of {of}, in {unit} at "
-                f"{fps:g} frames/s" + (f"; they are {best}." if found else ".")
-            )
+    if factor > _TINY and abs(np.log(factor)) > 0.15:
+        others[f"at {factor * fps:.3g} frames/s"] = factor * base
+    _check_derivative(motion, "base_velocity", base, others, 0.02)
+    others = {
+        "in the trunk's frame": quat_rotate(to_trunk, turning),
+        "in degrees": np.degrees(turning),
+        "with quaternions x, y, z, w": angular_velocity(xyzw, 1 / fps)[1:-1],
+    }
+    _check_derivative(motion, "base_angular_velocity", turning, others, 0.05)
+    others = {"in degrees": np.degrees(joints)}
+    _check_derivative(motion, "joint_velocities", joints, others, 0.1)
+
+
+def _check_derivative(
+    motion: Motion, name: str, true: Array, others: dict[str, Array], rounding: float
+) -> None:
+    """Compares one array with what it is by this and by other conventions."""
+    given = getattr(motion, name)[1:-1]
+    off, speed = _rms(given - true), _rms(true)
+    others |= {"all zero": np.zeros_like(true), "in reverse": true[::-1]}
+    for late in (k for k in range(-_MOST_LATE, _MOST_LATE + 1) if abs(k) > 2):
+        moved = np.roll(true, late, axis=0)
+        ends = slice(late) if late > 0 else slice(late, None)
+        moved[ends] = given[ends]  # of which nothing is known
+        others[f"{late} frames late"] = moved
+    best = min(others, key=lambda how: _rms(given - others[how]))
+    found = _rms(given - others[best]) < off / 4
+    far = np.abs(given - true).max() > 0.5 * np.abs(true).max() + 5 * rounding
+    if far or off > 0.5 * speed + rounding or (found and off > _DOUBT * rounding):
+        raise InputError(
+            f"The values of {name} are not the derivatives of {_INTEGRALS[name]} at "
+            f"{motion.fps:g} frames/s" + (f"; they are {best}." if found else ".")
+        )
 
 
 def _rms(values: Array) -> float:
@@ -208,9 +201,9 @@ def _rms(values: Array) -> float:
 
 def _check_feet(motion: Motion, robot: Robot) -> None:
     x, y = motion.base_quaternion[:, 1], motion.base_quaternion[:, 2]
-    if (up := np.median(1 - 2 * (x * x + y * y))) < 0.5:
+    if (cos := np.median(1 - 2 * (x * x + y * y))) < 0.5:
         raise InputError(
-            f"Its trunk's z axis is {np.degrees(np.arccos(up)):.0f} degrees from the "
+            f"Its trunk's z axis is {np.degrees(np.arccos(cos)):.0f} degrees from the "
             "world's: quaternions must be w, x, y, z, and z up."
         )
     slip = stance_speed(motion, robot)
@@ -240,15 +233,11 @@ def _check_feet(motion: Motion, robot: Robot) -> None:
             f"Its feet move at {slip:.2g} m/s while contacts say that they stand, "
             f"and its base at {base:.2g} m/s."
         )
-    down = motion.contacts
-    if (
-        down.any()
-        and not down.all()
-        and soles[down].mean() > soles[~down].mean() + 0.01
-    ):
+    down, up = soles[motion.contacts], soles[~motion.contacts]
+    if len(down) and len(up) and down.mean() > up.mean() + 0.01:
         raise InputError(
-            f"Its feet are {soles[down].mean():.3f} m above the ground where contacts "
-            f"say that they stand, {soles[~down].mean():.3f} m where they do not."
+            f"Its feet are {down.mean():.3f} m above the ground where contacts "
+            f"say that they stand, {up.mean():.3f} m where they do not."
         )
 
 
@@ -262,28 +251,24 @@ def stance_speed(motion: Motion, robot: Robot) -> float:
 
 def _other_readings(motion: Motion) -> dict[str, Motion]:
     """Returns the motion as read under other conventions."""
-    q = motion.base_quaternion
-    readings = {
-        "with quaternions x, y, z, w": replace(
-            motion, base_quaternion=q[:, [3, 0, 1, 2]]
-        ),
-        "with inverse quaternions": replace(motion, base_quaternion=quat_conjugate(q)),
+    q, joints = motion.base_quaternion, motion.joint_positions
+    readings: dict[str, dict[str, Any]] = {
+        "with quaternions x, y, z, w": {"base_quaternion": q[:, _XYZW]},
+        "with inverse quaternions": {"base_quaternion": quat_conjugate(q)},
+        "with hips of the other sign": {"joint_positions": joints * MIRROR_JOINT_SIGNS},
+        "with y to the other side": {
+            "base_position": motion.base_position * MIRROR_POLAR
+        },
     }
-    turned = motion.joint_positions * MIRROR_JOINT_SIGNS
-    readings["with hips of the other sign"] = replace(motion, joint_positions=turned)
-    other_y = motion.base_position * MIRROR_POLAR
-    readings["with y to the other side"] = replace(motion, base_position=other_y)
-    per_leg = motion.joint_positions.reshape(len(motion), 4, -1)
+    per_leg = joints.reshape(len(motion), 4, -1)
     for order in list(permutations(range(4)))[1:]:
         # Leg k of the robot is at order[k] in the file.
         names = ", ".join(LEGS[order.index(k)] for k in range(4))
-        joints = per_leg[:, order].reshape(len(motion), -1)
-        contacts = motion.contacts[:, order]
+        legs = {"joint_positions": per_leg[:, order].reshape(len(motion), -1)}
+        contacts = {"contacts": motion.contacts[:, order]}
         readings |= {
-            f"with legs in the order {names}": replace(motion, joint_positions=joints),
-            f"with contacts in the order {names}": replace(motion, contacts=contacts),
-            f"with legs and contacts in the order {names}": replace(
-                motion, joint_positions=joints, contacts=contacts
-            ),
+            f"with legs in the order {names}": legs,
+            f"with contacts in the order {names}": contacts,
+            f"with legs and contacts in the order {names}": legs | contacts,
         }
-    return readings
+    return {how: replace(motion, **read) for how, read in readings.items()}

@@ -4,17 +4,17 @@ The same definitions hold for an animal's keypoints and for a robot's kinematics
 not depend on scale. x is the fore-aft position of a toe relative to the trunk, along
 the trunk's heading.
 
-Stride period     The lag T of the first high peak of the correlation between the four
-x(t) and the     four x(t + T), up to half of the clip, refined by a parabola through
-the peak and     its neighbours. It is undefined for a clip shorter than three strides
-(or fewer, if     so requested). Phase lag     The lag of a toe's cycle behind that of
-RL as a share of the stride, 0 to 1: the     difference between the phases of the
-fundamentals of x(t), fitted by least squares     together with two harmonics and a
-straight line. Duty factor     The share of whole strides in which a toe is down. It is
-down between two frames if     its sole is lower than 6 % of the stance height in both
-and its speed over the ground     is below half of the trunk's mean speed, or below half
-a stance height per second if     that is more. A toe that hovers or moves along with
-the trunk is never down.
+- Stride period: the lag T of the first high peak of the correlation between the four
+  x(t) and the four x(t + T), up to half of the clip, refined by a parabola through the
+  peak and its neighbours. It is undefined for a clip shorter than three strides, or
+  fewer if so requested.
+- Phase lag: the lag of a toe's cycle behind that of RL as a share of the stride, 0 to
+  1. It is the difference between the phases of the fundamentals of x(t), fitted by
+  least squares together with two harmonics and a straight line.
+- Duty factor: the share of whole strides in which a toe is down. It is down between two
+  frames if its sole is lower than 6 % of the stance height in both and its speed over
+  the ground is below half of the trunk's mean speed, or below half a stance height per
+  second if that is more. A toe that hovers or moves along with the trunk is never down.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ from loco_drake.motion.quality import toe_trajectories
 
 Array = NDArray[np.float64]
 
-REFERENCE_LEG = LEGS.index("RL")
+_REFERENCE_LEG = LEGS.index("RL")
 MIN_STRIDES = 3
 
 # A peak is high from this share of the highest; noise can raise the peak at two strides
@@ -59,8 +59,7 @@ class Track:
         """Position of each toe ahead of the trunk, along its heading, m, (T, 4)."""
         offset = self.soles[..., :2] - self.trunk[:, None]
         ahead = np.stack((np.cos(self.yaw), np.sin(self.yaw)), axis=-1)
-        along: Array = np.einsum("tlk,tk->tl", offset, ahead)
-        return along
+        return np.einsum("tlk,tk->tl", offset, ahead)
 
 
 @dataclass(frozen=True)
@@ -73,17 +72,11 @@ class GaitTiming:
 
 
 def clip_track(clip: KeypointClip, stance_height: float) -> Track:
-    """Returns the track of an animal; its trunk is midway between withers and hip.
-
-    Args:
-        clip: ground at z = 0.
-        stance_height: stance height of the animal, m.
-    """
+    """Returns the track of an animal; its trunk is midway between withers and hip."""
     spine = clip.withers - clip.hip
-    middle = (clip.withers + clip.hip) / 2
     return Track(
         fps=clip.fps,
-        trunk=middle[:, :2],
+        trunk=((clip.withers + clip.hip) / 2)[:, :2],
         yaw=np.arctan2(spine[:, 1], spine[:, 0]),
         soles=clip.toes,
         stance_height=stance_height,
@@ -92,12 +85,11 @@ def clip_track(clip: KeypointClip, stance_height: float) -> Track:
 
 def motion_track(motion: Motion, robot: Quadruped) -> Track:
     """Returns the track of a robot's motion."""
-    soles = toe_trajectories(motion, robot) - [0.0, 0.0, robot.foot_radius]
     return Track(
         fps=motion.fps,
         trunk=motion.base_position[:, :2],
         yaw=yaw_of(motion.base_quaternion),
-        soles=soles,
+        soles=toe_trajectories(motion, robot) - [0.0, 0.0, robot.foot_radius],
         stance_height=robot.stand_height,
     )
 
@@ -122,8 +114,7 @@ def stride_period(track: Track, strides: int = MIN_STRIDES) -> float | None:
     high = correlation[peaks] >= _HIGH_PEAK * correlation[peaks].max()
     peak = int(peaks[high][0])
     before, top, after = correlation[peak - 1 : peak + 2]
-    vertex = (before - after) / (2 * (before - 2 * top + after))
-    period = float(peak + vertex)
+    period = float(peak + (before - after) / (2 * (before - 2 * top + after)))
     # Tolerance for a clip of exactly this many strides.
     enough = len(signals) - 1 >= strides * period - 0.5
     return period / track.fps if enough else None
@@ -137,8 +128,7 @@ def phase_lags(track: Track, period: float) -> Array:
     basis = np.concatenate((np.cos(angles), np.sin(angles), line), axis=-1)
     fit, *_ = np.linalg.lstsq(basis, track.fore_aft)
     phase = np.arctan2(fit[_HARMONICS], fit[0]) / (2 * np.pi)
-    lags: Array = (phase - phase[REFERENCE_LEG]) % 1.0
-    return lags
+    return (phase - phase[_REFERENCE_LEG]) % 1.0
 
 
 def duty_factors(track: Track, period: float) -> Array:
@@ -151,15 +141,13 @@ def duty_factors(track: Track, period: float) -> Array:
     low = track.soles[..., 2] < _DOWN_HEIGHT * track.stance_height
     down = low[:-1] & low[1:] & slow
     strides = int(len(down) / track.fps / period)
-    factors: Array = down[: round(strides * period * track.fps)].mean(axis=0)
-    return factors
+    return down[: round(strides * period * track.fps)].mean(axis=0)
 
 
 def _speed(points: Array, fps: float) -> Array:
     """Returns the speeds between frames, (T - 1, ...), of points (T, ..., 2)."""
     steps = np.diff(points, axis=0) * fps
-    speed: Array = np.hypot(steps[..., 0], steps[..., 1])
-    return speed
+    return np.hypot(steps[..., 0], steps[..., 1])
 
 
 def _correlation(signals: Array, lag: int) -> float:

@@ -1,16 +1,20 @@
-"""Gait labels: the source of a motion and its gait."""
+"""Gait labels, the source of a motion and its gait, and schedules of them."""
 
 from dataclasses import dataclass
+from itertools import pairwise
+from math import isfinite, nan
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from loco_drake.common.errors import check_choice, check_name
+from loco_drake.common.errors import InputError, check_choice, check_name
 
 # Sources and gaits with an input of their own in the shipped networks. Others are valid
 # too but share OTHER, so these tuples never change.
 SOURCES = ("dog", "horse", "mpc", "solo8")
 GAITS = ("pace", "trot", "gallop", "walk", "bound", "crawl", "stilt", "wave")
 OTHER = "other"
+_SYNTAX = "such as dog-pace,dog-trot@3,dog-gallop@6"
 
 
 @dataclass(frozen=True, order=True)
@@ -89,3 +93,58 @@ def parse_label(text: str) -> GaitLabel:
     """
     names = [str(label) for label in LABELS]
     return LABELS[names.index(check_choice("gait", text, names))]
+
+
+@dataclass(frozen=True)
+class GaitSchedule:
+    """Consecutive gaits, written ``dog-pace,dog-trot@3,dog-gallop@6``."""
+
+    labels: tuple[GaitLabel, ...]  # in order
+    starts: tuple[float, ...] = (0.0,)  # start time of each in s, ascending from 0
+
+    def __str__(self) -> str:
+        later = zip(self.labels[1:], self.starts[1:], strict=True)
+        return ",".join([str(self.labels[0]), *(f"{k}@{t:g}" for k, t in later)])
+
+    def at(self, times: ArrayLike) -> NDArray[np.int64]:
+        """Returns the index into LABELS at each of ``times`` (N,), s."""
+        place = np.searchsorted(self.starts, times, side="right") - 1
+        return np.array([label.index for label in self.labels])[place]
+
+    def check_ends_by(self, duration: float) -> None:
+        """Raises InputError if a gait starts only after ``duration`` s."""
+        if self.starts[-1] >= duration:
+            raise InputError(
+                f"{self.labels[-1]} starts at {self.starts[-1]:g} s, but changes "
+                f"of gait must come before the end, at {duration:g} s."
+            )
+
+
+def parse_schedule(text: str) -> GaitSchedule:
+    """Returns the schedule written as ``text``: a label, or several with start times.
+
+    Raises:
+        InputError: if a label is unknown, or a time is missing, not a number, or not
+            later than the one before.
+    """
+    first, *later = text.split(",")
+    labels, starts = [parse_label(first)], [0.0]
+    for part in later:
+        name, _, time = part.partition("@")
+        labels.append(parse_label(name))
+        try:
+            starts.append(float(time))
+        except ValueError:
+            starts.append(nan)
+        if not isfinite(starts[-1]):
+            raise InputError(
+                f"Each gait but the first needs the time in s at which it begins, "
+                f"{_SYNTAX}, which {part!r} lacks."
+            )
+    for earlier, start in pairwise(starts):
+        if start <= earlier:
+            raise InputError(
+                f"Gaits must begin one after the other, at rising times above 0 s, "
+                f"{_SYNTAX}, not at {start:g} s after {earlier:g} s."
+            )
+    return GaitSchedule(tuple(labels), tuple(starts))

@@ -19,14 +19,12 @@ class KeypointClip:
     """
 
     source: str  # name of the animal or robot, such as dog; need not be a known one
-    gait: str  # name of the gait; need not be one of the fifteen labels
-    fps: float  # frames per second of the arrays, the source's own rate
-    withers: NDArray[np.float64]  # position of the withers, shape (T, 3)
-    hip: NDArray[np.float64]  # position of the hip (top of the pelvis), shape (T, 3)
-    # Positions of the toes, shape (T, 4, 3), legs FL, FR, RL, RR.
-    toes: NDArray[np.float64]
-    # Origin of the frames as text (file, frames, licence, ...).
-    provenance: dict[str, str]
+    gait: str  # need not be one of the fifteen labels
+    fps: float  # frames per second, the source's own rate
+    withers: NDArray[np.float64]  # shape (T, 3)
+    hip: NDArray[np.float64]  # top of the pelvis, shape (T, 3)
+    toes: NDArray[np.float64]  # legs FL, FR, RL, RR, shape (T, 4, 3)
+    provenance: dict[str, str]  # origin as text: file, frames, licence, ...
 
     def __post_init__(self) -> None:
         GaitLabel(self.source, self.gait)  # checks the names

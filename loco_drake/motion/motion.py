@@ -15,7 +15,7 @@ from loco_drake.models.legs import (
     MIRROR_POLAR,
     MIRROR_QUATERNION,
 )
-from loco_drake.motion.gaits import GaitLabel
+from loco_drake.motion.gaits import GaitLabel, GaitSchedule
 from loco_drake.motion.keypoints import mirrored_provenance
 
 FPS = 50.0  # rate of every Motion written by this project, and of the policy
@@ -37,38 +37,22 @@ class Motion:
 
     W is the world: z up, ground at z = 0. B is the robot's trunk frame. Arrays of
     joints follow ``joint_names``, legs FL, FR, RL, RR.
-
-    Attributes:
-        robot: name of the robot, as in :func:`loco_drake.models.robots.get_robot`.
-        source: origin of the motion, such as dog.
-        gait: name of the gait.
-        fps: frames per second.
-        joint_names: names of the J joints.
-        base_position: p_WB in m, shape (T, 3).
-        base_quaternion: R_WB as unit quaternions w, x, y, z, shape (T, 4).
-        joint_positions: rad, shape (T, J).
-        base_velocity: v_WB_W in m/s, shape (T, 3).
-        base_angular_velocity: w_WB_W in rad/s, shape (T, 3).
-        joint_velocities: rad/s, shape (T, J).
-        contacts: whether each foot is on the ground, bool, shape (T, 4).
-        provenance: origin of the motion as text.
-        gait_changes: first frame and label of each gait, the first at frame 0; empty
-            if there is only one gait.
     """
 
-    robot: str
-    source: str
+    robot: str  # name, as in loco_drake.models.robots.get_robot
+    source: str  # origin, such as dog
     gait: str
-    fps: float
-    joint_names: tuple[str, ...]
-    base_position: NDArray[np.float64]
-    base_quaternion: NDArray[np.float64]
-    joint_positions: NDArray[np.float64]
-    base_velocity: NDArray[np.float64]
-    base_angular_velocity: NDArray[np.float64]
-    joint_velocities: NDArray[np.float64]
-    contacts: NDArray[np.bool_]
-    provenance: dict[str, str] = field(default_factory=dict)
+    fps: float  # frames per second
+    joint_names: tuple[str, ...]  # of the J joints
+    base_position: NDArray[np.float64]  # p_WB in m, shape (T, 3)
+    base_quaternion: NDArray[np.float64]  # R_WB as unit w x y z, shape (T, 4)
+    joint_positions: NDArray[np.float64]  # rad, shape (T, J)
+    base_velocity: NDArray[np.float64]  # v_WB_W in m/s, shape (T, 3)
+    base_angular_velocity: NDArray[np.float64]  # w_WB_W in rad/s, shape (T, 3)
+    joint_velocities: NDArray[np.float64]  # rad/s, shape (T, J)
+    contacts: NDArray[np.bool_]  # whether each foot is on the ground, shape (T, 4)
+    provenance: dict[str, str] = field(default_factory=dict)  # origin as text
+    # First frame, from 0, and label of each gait; empty if there is only one.
     gait_changes: tuple[tuple[int, GaitLabel], ...] = ()
 
     def __post_init__(self) -> None:
@@ -121,9 +105,8 @@ class Motion:
     def label_indices(self) -> NDArray[np.int64]:
         """Row of :data:`loco_drake.motion.gaits.ONE_HOT` of each frame, shape (T,)."""
         changes = self.gait_changes or ((0, self.label),)
-        starts = [start for start, _ in changes]
-        place = np.searchsorted(starts, np.arange(len(self)), side="right") - 1
-        return np.array([label.index for _, label in changes])[place]
+        starts, labels = zip(*changes, strict=True)
+        return GaitSchedule(labels, starts).at(np.arange(len(self)))
 
     def slice(self, start: int, end: int) -> "Motion":
         """Returns frames ``start`` to ``end`` (exclusive)."""

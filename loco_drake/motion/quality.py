@@ -22,31 +22,21 @@ _LIMIT_TOLERANCE = 1e-6
 def toe_trajectories(motion: Motion, robot: Quadruped) -> Array:
     """Returns the centres of the toe spheres p_WF in m, shape (T, 4, 3)."""
     p_BF = robot.toe_positions(motion.joint_positions)
-    p_WF: Array = motion.base_position[:, None] + quat_rotate(
-        motion.base_quaternion[:, None], p_BF
-    )
-    return p_WF
+    p_BoF_W = quat_rotate(motion.base_quaternion[:, None], p_BF)
+    return motion.base_position[:, None] + p_BoF_W
 
 
 def stance_slip_speeds(p_WF: Array, foot_radius: float, fps: float) -> Array:
-    """Returns the horizontal speed in m/s of each toe in each step of its stance.
+    """Returns the horizontal speed in m/s of each toe in each step of its stance, (N,).
 
-    A toe is in stance if the lowest point of its sphere is within 10 mm of the ground,
-    or below it, in two consecutive frames. The speed is that between these frames.
-
-    Args:
-        p_WF: centres of the toe spheres in m, shape (T, 4, 3).
-        foot_radius: m.
-        fps: frames per second.
-
-    Returns:
-        One speed for each pair of frames and toe in stance, shape (N,).
+    A toe, with its sphere's centre at p_WF (T, 4, 3), is in stance if the lowest point
+    of its sphere is within 10 mm of the ground, or below it, in two consecutive frames.
+    The speed is that between these frames.
     """
     low = p_WF[..., 2] - foot_radius <= STANCE_HEIGHT
     stance = low[1:] & low[:-1]
     steps = np.diff(p_WF[..., :2], axis=0)
-    speeds: Array = np.hypot(steps[..., 0], steps[..., 1])[stance] * fps
-    return speeds
+    return np.hypot(steps[..., 0], steps[..., 1])[stance] * fps
 
 
 def stance_slip_median(p_WF: Array, foot_radius: float, fps: float) -> float | None:

@@ -10,7 +10,7 @@ from loco_drake.evaluation.gait_change import (
     roughness,
 )
 from loco_drake.models.robots import get_robot
-from loco_drake.motion.gait_schedule import parse_schedule
+from loco_drake.motion.gaits import parse_schedule
 from tests.synthetic_motion import synthetic_motion
 
 GO2 = get_robot("go2")

@@ -17,8 +17,7 @@ from loco_drake.generation.tokenizer import (
     Tokenizer,
 )
 from loco_drake.models.robots import get_robot
-from loco_drake.motion.gait_schedule import parse_schedule
-from loco_drake.motion.gaits import LABELS, parse_label
+from loco_drake.motion.gaits import LABELS, parse_label, parse_schedule
 from tests.tiny_model import make_tiny_model
 
 PACE, TROT = parse_label("dog-pace"), parse_label("dog-trot")

@@ -13,8 +13,7 @@ from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import ROBOTS, get_robot
 from loco_drake.models.shipped import pretrained_path
-from loco_drake.motion.gait_schedule import parse_schedule
-from loco_drake.motion.gaits import parse_label
+from loco_drake.motion.gaits import parse_label, parse_schedule
 from loco_drake.motion.motion_file import load_motion
 from loco_drake.motion.quality import (
     joint_speed_ratio_max,
@@ -155,7 +154,7 @@ def test_a_pace_is_a_trot_by_its_legs_a_second_after_the_change():
 THREADS = """
 import hashlib, numpy as np, torch
 from loco_drake.evaluation.gait_change import forward_speed, roughness
-from loco_drake.motion.gait_schedule import parse_schedule
+from loco_drake.motion.gaits import parse_schedule
 from loco_drake.motion.gaits import parse_label
 from loco_drake.generation.motion_model import pretrained_motion_model
 torch.set_num_threads({threads})

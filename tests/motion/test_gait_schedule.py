@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from loco_drake.common.errors import InputError
-from loco_drake.motion.gait_schedule import GaitSchedule, parse_schedule
-from loco_drake.motion.gaits import LABELS, parse_label
+from loco_drake.motion.gaits import LABELS, GaitSchedule, parse_label, parse_schedule
 
 PACE, TROT, GALLOP = (parse_label(f"dog-{g}") for g in ("pace", "trot", "gallop"))
 
