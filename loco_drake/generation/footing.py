@@ -56,7 +56,7 @@ def step_footing(
     """Places T frames of B motions in the world.
 
     Args:
-        robot: whose legs.
+        robot: the robot.
         footing: after the frame before.
         features: with contacts as probabilities, shape (B, T, SIZE).
 
@@ -64,12 +64,13 @@ def step_footing(
         Footing after the last frame; q as in :func:`features.positions`, shape
         (B, T, 19); contacts, shape (B, T, 4).
     """
+    likely = features[..., ft.CONTACTS]
     pose, shift, anchor = footing.pose, footing.shift, footing.anchor
     offset, down = footing.offset, footing.contacts
-    p_HF = _toes(robot, features)
+    # Relative to the ground under the trunk.
+    p_HF = _toes(robot, positions(robot, features, np.zeros((*likely.shape[:2], 3))))
     turn = features[..., ft.YAW_RATE][..., 0] / FPS
     step_H = features[..., ft.VELOCITY] * robot.stand_height / FPS
-    likely = features[..., ft.CONTACTS]
     poses, offsets, contacts = [], [], []
     for k in range(features.shape[1]):
         yaw = pose[:, 2] + turn[:, k]
@@ -106,10 +107,8 @@ def step_footing(
     return after, _move_toes(robot, q, moved), np.stack(contacts, axis=1)
 
 
-def _toes(robot: Robot, features: Array) -> Array:
-    """Returns toes relative to the ground under the trunk in H, (B, T, 4, 3)."""
-    level = np.zeros((*features.shape[:-1], 3))
-    q = positions(robot, features, level)
+def _toes(robot: Robot, q: Array) -> Array:
+    """Returns p_WF of the toes, shape (..., 4, 3)."""
     p_BF = robot.toe_positions(q[..., 7:])
     return quat_rotate(q[..., None, :4], p_BF) + q[..., None, 4:7]
 
@@ -119,19 +118,17 @@ def _move_toes(robot: Robot, q: Array, offset: Array) -> Array:
 
     The base is raised where a leg cannot fold far enough.
     """
-    q_WB, p_WB = q[..., None, :4], q[..., None, 4:7]
-    p_WF = quat_rotate(q_WB, robot.toe_positions(q[..., 7:])) + p_WB + offset
+    p_WF = _toes(robot, q) + offset
     p_WF[..., 2] = np.maximum(p_WF[..., 2], robot.foot_radius)
-    joints, reached = _reach(robot, q_WB, p_WB, p_WF)
-    sunk = np.maximum(robot.foot_radius - reached[..., 2], 0.0).max(axis=-1)
-    raised = q[..., :7].copy()
-    raised[..., 6] += sunk
+    q = _reach(robot, q, p_WF)
+    sunk = np.maximum(robot.foot_radius - _toes(robot, q)[..., 2], 0.0).max(axis=-1)
     if sunk.any():
-        joints, _ = _reach(robot, q_WB, raised[..., None, 4:], p_WF)
-    return np.concatenate((raised, joints), axis=-1)
+        q[..., 6] += sunk
+        q = _reach(robot, q, p_WF)
+    return q
 
 
-def _reach(robot: Robot, q_WB: Array, p_WB: Array, p_WF: Array) -> tuple[Array, Array]:
-    """Returns joints within their limits, and the resulting toe positions."""
-    joints = robot.nearest_joints(quat_rotate(quat_conjugate(q_WB), p_WF - p_WB))
-    return joints, quat_rotate(q_WB, robot.toe_positions(joints)) + p_WB
+def _reach(robot: Robot, q: Array, p_WF: Array) -> Array:
+    """Returns q with the joints, within limits, that take the toes nearest to p_WF."""
+    p_BF = quat_rotate(quat_conjugate(q[..., None, :4]), p_WF - q[..., None, 4:7])
+    return np.concatenate((q[..., :7], robot.nearest_joints(p_BF)), axis=-1)

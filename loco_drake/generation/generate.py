@@ -30,15 +30,14 @@ def generate_motions(
     """Generates one motion for each seed, in one batch.
 
     Args:
-        model: from
-            :func:`.motion_model.pretrained_motion_model` or one's own training.
+        model: shipped, or of one's own training.
         gait: one that the generator was trained on, or several after each other.
             The motion's label is then SEVERAL; ``gait_changes`` says which.
         duration: from first to last frame, in s, at most LONGEST_DURATION.
         seeds: not negative; each motion depends on its own only.
-        temperature: see :meth:`MotionModel.extend`.
+        temperature: see :meth:`.Generator.sample`.
         top_p: see there.
-        speed_rank: see :meth:`MotionModel.start`.
+        speed_rank: see :meth:`.MotionModel.start`.
 
     Raises:
         InputError: if an argument is not as said.
@@ -59,12 +58,12 @@ def generate_motions(
             stream, labels, temperature=temperature, top_p=top_p
         )
         parts.append(frames)
-    q = np.concatenate([part.q for part in parts], axis=1)[:, :count]
-    v = np.concatenate([part.v for part in parts], axis=1)[:, :count]
-    contacts = np.concatenate([part.contacts for part in parts], axis=1)[:, :count]
-    rows = np.concatenate([part.labels[0] for part in parts])[:count]
-    changes = [0, *(np.flatnonzero(np.diff(rows)) + 1).tolist()]
-    gait_changes = tuple((k, ROW_LABELS[rows[k]]) for k in changes)
+    q, v, contacts, rows = (
+        np.concatenate([getattr(part, name) for part in parts], axis=1)[:, :count]
+        for name in ("q", "v", "contacts", "labels")
+    )
+    changes = [0, *(np.flatnonzero(np.diff(rows[0])) + 1).tolist()]
+    gait_changes = tuple((k, ROW_LABELS[rows[0, k]]) for k in changes)
     return [
         Motion(
             robot=model.robot.name,
@@ -94,14 +93,9 @@ def generate_motions(
 
 
 def chunk_labels(model: MotionModel, schedule: GaitSchedule, chunk: int) -> Integers:
-    """Returns the labels of the tokens of a chunk, shape (model.chunk_tokens,).
+    """Returns the labels of the tokens of chunk number ``chunk``, (chunk_tokens,).
 
     A token has the gait that is scheduled at its first frame.
-
-    Args:
-        model: writes the chunk.
-        schedule: from time 0 on.
-        chunk: its number, of chunks of the usual length.
     """
     tokens = chunk * model.chunk_tokens + np.arange(model.chunk_tokens)
     return schedule.at(tokens * model.frames_per_token / FPS)

@@ -14,10 +14,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
+from torch.nn import functional
 
 from loco_drake.common.weights import load_network
 from loco_drake.generation import speed_rank
-from loco_drake.generation.layers import RotaryAttention
 from loco_drake.motion.gaits import LABELS, ONE_HOT, ONE_HOT_SIZE
 
 # Durations are binned on a log scale; the last bin is "long" and never ends.
@@ -43,22 +43,67 @@ class GeneratorConfig:
     dropout: float = 0.1  # probability, while training
 
 
-# Keys and values of each layer for the times seen so far.
-Cache = list[tuple[Tensor, Tensor]]
+# Keys and values of a layer for the P times so far, each (B, heads, P, size).
+Past = tuple[Tensor, Tensor]
+Cache = list[Past]  # of all layers
+
+
+class RotaryAttention(nn.Module):
+    """Causal self-attention that knows only relative times (Su et al. 2021, RoPE)."""
+
+    def __init__(self, config: GeneratorConfig) -> None:
+        super().__init__()
+        width = config.width
+        self.heads = config.heads
+        self.dropout = config.dropout
+        self.qkv = nn.Linear(width, 3 * width, bias=False)
+        self.out = nn.Linear(width, width, bias=False)
+        size = width // self.heads
+        rates = 1000.0 ** (-torch.arange(0, size, 2) / size)
+        self.register_buffer("rates", rates, persistent=False)
+        self.rates: Tensor
+
+    def forward(self, x: Tensor, past: Past | None) -> tuple[Tensor, Past]:
+        """Attends from the T times of x (B, T, width) to them and to ``past``.
+
+        With a past, T must be 1. Returns the output, shaped as x, and all P + T times.
+        """
+        batch, time, width = x.shape
+        # (B, T, 3 * width) -> (3, B, heads, T, size)
+        qkv = self.qkv(x).view(batch, time, 3, self.heads, -1).permute(2, 0, 3, 1, 4)
+        start = 0 if past is None else past[0].shape[2]
+        angles = torch.arange(start, start + time)[:, None] * self.rates
+        q, k = turn_channels(qkv[:2], angles.cos(), angles.sin())
+        v = qkv[2]
+        if past is not None:
+            if time > 1:
+                raise ValueError("with a past, times come one by one")
+            k, v = torch.cat((past[0], k), dim=2), torch.cat((past[1], v), dim=2)
+        attended = functional.scaled_dot_product_attention(
+            q,
+            k,
+            v,
+            dropout_p=self.dropout if self.training else 0.0,
+            is_causal=past is None and time > 1,
+        )
+        out: Tensor = self.out(attended.transpose(1, 2).reshape(batch, time, width))
+        return out, (k, v)
+
+
+def turn_channels(x: Tensor, cos: Tensor, sin: Tensor) -> Tensor:
+    """Rotates pairs of channels of (..., T, size) by angles (T, size / 2)."""
+    a, b = x.chunk(2, dim=-1)
+    return torch.cat((a * cos - b * sin, a * sin + b * cos), dim=-1)
 
 
 class Block(nn.Module):
-    """A transformer block: attention, then a feed-forward layer.
-
-    Args:
-        config: its sizes.
-    """
+    """A transformer block: attention, then a feed-forward layer."""
 
     def __init__(self, config: GeneratorConfig) -> None:
         super().__init__()
         width = config.width
         self.norm_attention = nn.LayerNorm(width)
-        self.attention = RotaryAttention(width, config.heads, config.dropout)
+        self.attention = RotaryAttention(config)
         self.mlp = nn.Sequential(
             nn.LayerNorm(width),
             nn.Linear(width, 4 * width),
@@ -67,9 +112,7 @@ class Block(nn.Module):
         )
         self.dropout = nn.Dropout(config.dropout)
 
-    def forward(
-        self, x: Tensor, past: tuple[Tensor, Tensor] | None
-    ) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+    def forward(self, x: Tensor, past: Past | None) -> tuple[Tensor, Past]:
         """Maps (B, T, width) to the same; see :class:`RotaryAttention`."""
         attended, present = self.attention(self.norm_attention(x), past)
         x = x + self.dropout(attended)
@@ -81,9 +124,6 @@ class Generator(nn.Module):
 
     Step t takes the codes of token t - 1 and the condition of token t, and predicts the
     codes of token t. The code ``codebook_size`` marks the start of a sequence.
-
-    Args:
-        config: its sizes.
     """
 
     def __init__(self, config: GeneratorConfig) -> None:
@@ -147,21 +187,16 @@ class Generator(nn.Module):
     def head(self, codebook: int, hidden: Tensor, earlier: Tensor) -> Tensor:
         """Returns logits (..., codebook_size) of one codebook.
 
-        Args:
-            codebook: which one.
-            hidden: output of the trunk, shape (..., width).
-            earlier: sum of :meth:`drawn` over the codebooks before, shape (..., width).
+        Takes the trunk's output and the sum of :meth:`drawn` over the codebooks before.
         """
-        logits: Tensor = self.head_out[codebook](
-            self.head_in[codebook](hidden) + earlier
-        )
+        seen = self.head_in[codebook](hidden) + earlier
+        logits: Tensor = self.head_out[codebook](seen)
         return logits
 
     def drawn(self, codebook: int, codes: Tensor) -> Tensor:
         """Returns the embedding of sampled codes (...) for later heads."""
-        told: Tensor = self.earlier_books(
-            codes + codebook * (self.config.codebook_size + 1)
-        )
+        first = codebook * (self.config.codebook_size + 1)
+        told: Tensor = self.earlier_books(codes + first)
         return told
 
     def forward(
@@ -204,7 +239,7 @@ class Generator(nn.Module):
                 new one (without history: of the new ones), shape (B, H - 1 + n), or
                 (B, n).
             speed_bins: of the sequence, shape (B, 1).
-            duration: bin of the sequence's duration, shape (B,).
+            duration: see :meth:`trunk`.
             uniforms: random numbers in [0, 1), shape (B, n, codebooks).
             temperature: divides the logits; 0 is greedy.
             top_p: sample from the likeliest codes that together reach it.
@@ -242,7 +277,7 @@ def draw(logits: Tensor, uniforms: Tensor, temperature: float, top_p: float) -> 
         uniforms: in [0, 1), shape (B,); the code is where the cumulated probability
             of the codes, likeliest first, passes it.
         temperature: see :meth:`Generator.sample`.
-        top_p: see :meth:`Generator.sample`.
+        top_p: see there.
     """
     if temperature == 0:
         return logits.argmax(dim=-1)

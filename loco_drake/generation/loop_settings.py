@@ -5,6 +5,9 @@ from pathlib import Path
 
 from loco_drake.common.errors import check_at_least, check_bounds
 
+# Those that the result depends on, besides the steps.
+RUN_SETTINGS = ("learning_rate", "weight_decay", "seed")
+
 
 @dataclass
 class LoopSettings:

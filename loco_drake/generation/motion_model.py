@@ -35,29 +35,17 @@ class Stream(Immutable):
     """Immutable state of B motions in generation.
 
     One frame is held back, since its velocity needs the frame after it.
-
-    Attributes:
-        seeds: of each motion, shape (B,).
-        duration: intended duration of each, s, shape (B,).
-        speed_rank: of each, in [0, 1], see :mod:`.speed_rank`, shape (B,).
-        chunk: number of chunks so far.
-        tokens: the latest ones, shape (B, n, codebooks).
-        labels: of ``tokens``, index into gaits.LABELS, shape (B, n).
-        footing: state of base and feet after the frame held back.
-        q: the last frame returned and the one held back, shape (B, 2, 19), or
-            (B, 0, 19) before the first extension.
-        contacts: of the frame held back, shape (B, 4).
     """
 
-    seeds: Integers
-    duration: Array
-    speed_rank: Array
-    chunk: int
-    tokens: Integers
-    labels: Integers
-    footing: Footing
-    q: Array
-    contacts: NDArray[np.bool_]
+    seeds: Integers  # (B,)
+    duration: Array  # intended, s, (B,)
+    speed_rank: Array  # in [0, 1], see speed_rank.py, (B,)
+    chunk: int  # number of chunks so far
+    tokens: Integers  # the latest ones, (B, n, codebooks)
+    labels: Integers  # of the tokens, index into gaits.LABELS, (B, n)
+    footing: Footing  # after the frame held back
+    q: Array  # last frame returned and the one held back, (B, 2, 19); or (B, 0, 19)
+    contacts: NDArray[np.bool_]  # of the frame held back, (B, 4)
 
     def __post_init__(self) -> None:
         for value in (*vars(self).values(), *vars(self.footing).values()):
@@ -67,20 +55,13 @@ class Stream(Immutable):
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Consecutive frames of B motions at motion.FPS, in the order of Drake's plant.
+    """Consecutive frames of B motions at motion.FPS, in the order of Drake's plant."""
 
-    Attributes:
-        q: R_WB as w, x, y, z, p_WB in m, joints in rad, shape (B, n, 19).
-        v: w_WB_W in rad/s, v_WB_W in m/s, joints in rad/s, shape (B, n, 18); central
-            differences of q.
-        contacts: feet in stance, shape (B, n, 4).
-        labels: index into gaits.LABELS, shape (B, n).
-    """
-
-    q: Array
+    q: Array  # R_WB as w, x, y, z, p_WB in m, joints in rad, (B, n, 19)
+    # Central differences: w_WB_W in rad/s, v_WB_W in m/s, joints in rad/s, (B, n, 18).
     v: Array
-    contacts: NDArray[np.bool_]
-    labels: Integers
+    contacts: NDArray[np.bool_]  # feet in stance, (B, n, 4)
+    labels: Integers  # index into gaits.LABELS, (B, n)
 
     def __getitem__(self, index: int) -> "Frames":
         """Returns the frames of one motion, without the first axis."""
@@ -88,15 +69,11 @@ class Frames:
 
 
 class MotionModel:
-    """Tokenizer and generator as one source of motion. Immutable.
-
-    Args:
-        tokenizer: the tokenizer.
-        generator: a generator trained with this tokenizer.
-        robot: name of a robot that the tokenizer knows.
+    """Tokenizer and generator as one source of motion of a robot. Immutable.
 
     Raises:
-        InputError: if the three do not match.
+        InputError: if the generator was trained with another tokenizer, or the
+            tokenizer does not know the robot.
     """
 
     def __init__(self, tokenizer: Tokenizer, generator: Generator, robot: str) -> None:
@@ -136,11 +113,10 @@ class MotionModel:
         pose: Array | None = None,
         speed_rank: Array | float | None = None,
     ) -> Stream:
-        """Returns an empty stream of B motions.
+        """Returns an empty stream of B motions, each of which depends on its seed only.
 
         Args:
-            seeds: one for each motion, not negative, shape (B,). A motion depends only
-                on its own seed.
+            seeds: not negative, shape (B,).
             duration: intended duration, s, shape (B,) or for all.
             pose: x, y in m and yaw in rad of the first frame, shape (B, 3); default 0.
             speed_rank: rank in [0, 1] of the speed among the recorded speeds of the
@@ -148,19 +124,17 @@ class MotionModel:
         """
         seeds = np.array(seeds, dtype=np.int64)
         batch = len(seeds)
-        codebooks = self.generator.config.codebooks
         if speed_rank is None:
             speed_rank = drawn_rank(seeds)
+        pose = np.zeros((batch, 3)) if pose is None else np.array(pose, np.float64)
         return Stream(
             seeds=seeds,
             duration=np.full(batch, duration, dtype=np.float64),
             speed_rank=np.full(batch, speed_rank, dtype=np.float64),
             chunk=0,
-            tokens=np.zeros((batch, 0, codebooks), dtype=np.int64),
+            tokens=np.zeros((batch, 0, self.generator.config.codebooks), np.int64),
             labels=np.zeros((batch, 0), dtype=np.int64),
-            footing=start_footing(
-                np.zeros((batch, 3)) if pose is None else np.array(pose, np.float64)
-            ),
+            footing=start_footing(pose),
             q=np.zeros((batch, 0, 19)),
             contacts=np.zeros((batch, 4), dtype=np.bool_),
         )
@@ -169,12 +143,11 @@ class MotionModel:
         self,
         stream: Stream,
         labels: Integers,
-        tokens: int | None = None,
         *,
         temperature: float = 1.0,
         top_p: float = 0.95,
     ) -> tuple[Stream, Frames]:
-        """Generates more of each motion.
+        """Returns the stream extended by a chunk, and the ``chunk_frames`` of it.
 
         Random numbers are functions of seed and chunk, so extending a stream again in
         the same way gives the same frames.
@@ -182,26 +155,21 @@ class MotionModel:
         Args:
             stream: the stream, which is not modified.
             labels: index into gaits.LABELS of each motion (B,), or of each of its
-                new tokens (B, tokens).
-            tokens: number of tokens; default ``chunk_tokens``.
+                new tokens (B, chunk_tokens).
             temperature: see :meth:`Generator.sample`.
             top_p: see :meth:`Generator.sample`.
-
-        Returns:
-            The extended stream, and ``tokens * frames_per_token`` frames.
 
         Raises:
             InputError: if the weights were not trained on a label.
         """
-        steps = self.chunk_tokens if tokens is None else tokens
         batch = len(stream.seeds)
         labels = np.asarray(labels, dtype=np.int64)
         self.check_labels(labels)
-        new = np.broadcast_to(labels.reshape(batch, -1), (batch, steps))
+        new = np.broadcast_to(labels.reshape(batch, -1), (batch, self.chunk_tokens))
         # The first tokens only provide context for the decoder.
         lead = 0 if stream.chunk else self._lead
         new = np.concatenate((np.repeat(new[:, :1], lead, axis=1), new), axis=1)
-        shape = (lead + steps, self.generator.config.codebooks)
+        shape = (new.shape[1], self.generator.config.codebooks)
         dice = [uniforms(int(seed), stream.chunk, shape) for seed in stream.seeds]
         window = self.generator.config.window
         history, given = stream.tokens[:, -window:], stream.labels[:, -window:]
@@ -220,16 +188,10 @@ class MotionModel:
     def append(
         self, stream: Stream, tokens: Integers, labels: Integers
     ) -> tuple[Stream, Frames]:
-        """Decodes tokens that continue ``stream``.
+        """Decodes tokens (B, n, codebooks), of labels (B, n), that continue ``stream``.
 
         For an empty stream, the frames of the first ``_lead`` tokens are not returned.
-
-        Args:
-            stream: the stream, which is not modified.
-            tokens: shape (B, n, codebooks).
-            labels: of the tokens, shape (B, n).
         """
-        batch = len(tokens)
         before = stream.tokens.shape[1]
         window = np.concatenate((stream.tokens, tokens), axis=1)
         window_labels = np.concatenate((stream.labels, labels), axis=1)
@@ -237,7 +199,7 @@ class MotionModel:
         with torch.inference_mode(), single_thread():
             decoded = self._decoder.decode(
                 torch.from_numpy(window[:, before - seen :]),
-                torch.full((batch,), self._robot_index),
+                torch.full((len(tokens),), self._robot_index),
             )
         features = decoded.numpy()[:, seen * self.frames_per_token :]
         footing, q, held = stream.footing, stream.q, stream.contacts[:, None]
@@ -265,16 +227,11 @@ class MotionModel:
             q=q[:, -2:].copy(),
             contacts=contacts[:, -1].copy(),
         )
+        earlier, later = q[:, :-2], q[:, 2:]
+        turn = quat_error(earlier[..., :4], later[..., :4])
         frames = Frames(
             q=q[:, 1:-1],
-            v=np.concatenate(
-                (
-                    quat_error(q[:, :-2, :4], q[:, 2:, :4]),
-                    q[:, 2:, 4:] - q[:, :-2, 4:],
-                ),
-                axis=-1,
-            )
-            * (FPS / 2),
+            v=np.concatenate((turn, later[..., 4:] - earlier[..., 4:]), -1) * (FPS / 2),
             contacts=contacts[:, :-1],
             labels=frame_labels[:, self.frames_per_token - 1 : -1],
         )
@@ -282,16 +239,14 @@ class MotionModel:
 
     @property
     def _lead(self) -> int:
-        needed = -(-SETTLING // self.frames_per_token)
-        return max(self.tokenizer.memory, needed)
+        return max(self.tokenizer.memory, -(-SETTLING // self.frames_per_token))
 
     def _settle(
         self, footing: Footing, features: Array
     ) -> tuple[Footing, Array, NDArray[np.bool_]]:
         """Plays the frames before the first so that the last is at the start pose.
 
-        Returns:
-            Footing; q of the last two frames, (B, 2, 19); contacts of the last.
+        Returns the footing, the last two frames (B, 2, 19) and contacts of the last.
         """
         there, _, _ = step_footing(
             self.robot, start_footing(np.zeros_like(footing.pose)), features

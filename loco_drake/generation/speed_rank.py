@@ -5,6 +5,7 @@ Conditioned on the rank as well, it keeps its speed. A rank applies to any gait:
 the slowest recorded speed, 1 the fastest.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable
 
 import numpy as np
@@ -25,9 +26,9 @@ _DICE = 2**62  # index of the random numbers for the rank; chunks count from 0
 
 
 def token_speeds(features: Array, frames_per_token: int) -> Array:
-    """Returns the speed along the heading around each token, (T / f,).
+    """Returns the speed along the heading around each token, stand heights/s, (T / f,).
 
-    In stand heights per second, as the features (T, SIZE) are.
+    Features are (T, SIZE).
     """
     frames = len(features) // frames_per_token * frames_per_token
     forward = features[:frames, VELOCITY.start]
@@ -38,14 +39,12 @@ def token_speeds(features: Array, frames_per_token: int) -> Array:
 def speed_edges(speeds: Iterable[tuple[int, Array]]) -> Array:
     """Returns the speeds between the bins of each label, (labels, BINS - 1).
 
-    A bin holds as much motion of its label as any other.
-
-    Args:
-        speeds: label and :func:`token_speeds` of all clips.
+    Takes label and :func:`token_speeds` of all clips. A bin holds as much motion of its
+    label as any other.
     """
-    by_label: dict[int, list[Array]] = {}
+    by_label: dict[int, list[Array]] = defaultdict(list)
     for label, of_clip in speeds:
-        by_label.setdefault(label, []).append(of_clip)
+        by_label[label].append(of_clip)
     edges = np.zeros((len(LABELS), BINS - 1))
     for label, clips in by_label.items():
         shares = np.arange(1, BINS) / BINS
@@ -53,7 +52,7 @@ def speed_edges(speeds: Iterable[tuple[int, Array]]) -> Array:
     return edges
 
 
-def speed_bin(edges: Array, label: int, speeds: Array) -> Integers:
+def speed_bin(edges: NDArray[np.floating], label: int, speeds: Array) -> Integers:
     """Returns the bin of speeds of a label, given :func:`speed_edges`."""
     return np.searchsorted(edges[label], speeds)
 

@@ -33,10 +33,8 @@ class Stitcher:
     """Assembles long motions from clips of one robot and one label.
 
     It counts how often each frame was used and prefers others. Otherwise clips that
-    slow down would lead to ever slower ones, where all motion would end.
-
-    Args:
-        clips: those of up to 2 BLEND + SHORTEST_STAY frames are left out.
+    slow down would lead to ever slower ones, where all motion would end. Clips of up to
+    2 BLEND + SHORTEST_STAY frames are left out.
 
     Raises:
         InputError: if all clips are too short.
@@ -71,7 +69,8 @@ class Stitcher:
         parts: list[Array] = []
         made = 0
         while made < frames:
-            leave, (next_clip, enter) = self._transition(clip, frame, random)
+            leave, row = self._transition(clip, frame, random)
+            next_clip, enter = int(self._clip_of[row]), int(self._frame_of[row])
             weight = (np.arange(1, BLEND + 1) / (BLEND + 1))[:, None]
             a = self._clips[clip][leave : leave + BLEND]
             b = self._clips[next_clip][enter : enter + BLEND]
@@ -86,8 +85,8 @@ class Stitcher:
 
     def _transition(
         self, clip: int, frame: int, random: np.random.Generator
-    ) -> tuple[int, tuple[int, int]]:
-        """Returns where to leave a clip that is at ``frame``, and where to continue."""
+    ) -> tuple[int, int]:
+        """Returns where to leave a clip that is at ``frame``, and the row to enter."""
         earliest, latest = frame + SHORTEST_STAY, len(self._clips[clip]) - BLEND
         wished = latest
         if random.random() > TO_THE_END:
@@ -113,11 +112,7 @@ class Stitcher:
         odds = np.exp((cost.min() - cost) / GREED).ravel()
         choice = random.choice(len(odds), p=odds / odds.sum())
         exit_index, target = divmod(int(choice), len(self._enterable))
-        row = int(self._enterable[target])
-        return int(exits[exit_index]), (
-            int(self._clip_of[row]),
-            int(self._frame_of[row]),
-        )
+        return int(exits[exit_index]), int(self._enterable[target])
 
 
 def _described(clip: Array) -> Array:

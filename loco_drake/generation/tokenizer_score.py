@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from loco_drake.common.determinism import single_thread
 from loco_drake.generation.features import (
@@ -16,38 +17,31 @@ from loco_drake.generation.features import (
 )
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.training_motions import Clip
-from loco_drake.models.robots import Robot, get_robot
+from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion import FPS
 
 
-class Toes(nn.Module):
-    """Differentiable kinematics of several robots in one batch.
+class Toes:
+    """Differentiable kinematics of several robots, named in order, in one batch."""
 
-    Args:
-        robots: features of a batch can be of any of these, by index.
-    """
+    def __init__(self, names: Sequence[str]) -> None:
+        robots = [get_robot(name) for name in names]
 
-    def __init__(self, robots: list[Robot]) -> None:
-        super().__init__()
-
-        def table(values: list[object]) -> Tensor:
+        def table(name: str) -> Tensor:
+            values = np.array([getattr(robot, name) for robot in robots])
             return torch.tensor(values, dtype=torch.float32)
 
-        self.hips = table([robot.p_BHip.tolist() for robot in robots])
-        self.offset = table([robot.abduction_offset.tolist() for robot in robots])
-        self.thigh = table([robot.thigh_length for robot in robots])
-        self.calf = table([robot.calf_length for robot in robots])
-        self.stand_height = table([robot.stand_height for robot in robots])
+        self.hips = table("p_BHip")
+        self.offset = table("abduction_offset")
+        self.thigh = table("thigh_length")
+        self.calf = table("calf_length")
+        self.stand_height = table("stand_height")
 
     def positions(self, features: Tensor, robot: Tensor) -> Tensor:
         """Returns the centres of the toe spheres in m, shape (B, T, 4, 3).
 
         They are relative to the point on the ground under the trunk, in the heading
-        frame H.
-
-        Args:
-            features: shape (B, T, SIZE).
-            robot: index of each sequence's robot, shape (B,).
+        frame H. Features (B, T, SIZE) are of the robots with the indices (B,).
         """
         joints = features[..., JOINTS]  # then leg by leg, (B, T, 4, 3)
         hip, thigh, calf = joints.reshape(*joints.shape[:-1], 4, 3).unbind(-1)
@@ -68,13 +62,8 @@ class Toes(nn.Module):
     def velocities(self, features: Tensor, p_HF: Tensor, robot: Tensor) -> Tensor:
         """Returns velocities of the toes over the ground in m/s, (B, T - 1, 4, 3).
 
-        Uses backward differences in the heading frame; the velocity of a stance foot is
-        zero.
-
-        Args:
-            features: shape (B, T, SIZE).
-            p_HF: from :meth:`positions`.
-            robot: index of each sequence's robot, shape (B,).
+        Uses backward differences in the heading frame of ``p_HF`` from
+        :meth:`positions`; the velocity of a stance foot is zero.
         """
         speed = features[:, 1:, VELOCITY] * self.stand_height[robot, None, None]
         rate = features[:, 1:, YAW_RATE]  # (B, T - 1, 1)
@@ -87,15 +76,10 @@ class Toes(nn.Module):
 
 @dataclass(frozen=True)
 class TokenizerScore:
-    """Reconstruction errors of a tokenizer.
+    """Reconstruction errors of a tokenizer."""
 
-    Attributes:
-        joint_rmse_rad: over frames and joints.
-        toe_error_rmse_m: Euclidean distance of the toe spheres' centres, relative to
-            the ground under the trunk, over frames and toes.
-    """
-
-    joint_rmse_rad: float
+    joint_rmse_rad: float  # over frames and joints
+    # Distance of the toe spheres' centres, see Toes.positions, over frames and toes.
     toe_error_rmse_m: float
 
 
@@ -109,7 +93,7 @@ def score_tokenizer(
         clips: frames beyond the last whole token are left out.
         codebooks: decodes these many codebooks only, the coarsest; None: all.
     """
-    toes = Toes([get_robot(name) for name in tokenizer.config.robots])
+    toes = Toes(tokenizer.config.robots)
     joints, distances = [], []
     for clip in clips:
         target = clip_tensor(tokenizer, clip)

@@ -1,5 +1,6 @@
 """Training of the generator on the tokens of clips."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -39,19 +40,17 @@ STITCHED_SECONDS = 20.0  # each
 CORRUPTION = 0.1  # share of input codes replaced, so that the model learns to recover
 
 
+# What Generator.forward takes: before, labels, speed_bins, duration and codes.
+Batch = tuple[Tensor, Tensor, Tensor, Tensor, Tensor]
+
+
 @dataclass(frozen=True, eq=False)
 class Codes:
-    """The tokens of one motion.
+    """The tokens of one motion."""
 
-    Attributes:
-        label: index into gaits.LABELS.
-        codes: shape (n, codebooks).
-        speeds: around each token, see :func:`speed_rank.token_speeds`, shape (n,).
-    """
-
-    label: int
-    codes: NDArray[np.int64]
-    speeds: NDArray[np.float64]
+    label: int  # index into gaits.LABELS
+    codes: NDArray[np.int64]  # (n, codebooks)
+    speeds: NDArray[np.float64]  # see speed_rank.token_speeds, (n,)
 
     def __len__(self) -> int:
         return len(self.codes)
@@ -82,9 +81,9 @@ def stitched_clips(clips: Sequence[Clip], count: int, seed: int) -> list[Clip]:
         InputError: if all clips of a robot and label are too short.
     """
     random = np.random.default_rng(seed)
-    groups: dict[tuple[str, GaitLabel], list[Clip]] = {}
+    groups: dict[tuple[str, GaitLabel], list[Clip]] = defaultdict(list)
     for clip in clips:
-        groups.setdefault((clip.robot, clip.label), []).append(clip)
+        groups[clip.robot, clip.label].append(clip)
     roots = {key: sum(map(len, group)) ** 0.5 for key, group in groups.items()}
     mean = sum(roots.values()) / len(roots)
     stitched = []
@@ -128,15 +127,13 @@ def train_generator(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
         generator = Generator(config)
-    edges = speed_rank.speed_edges((each.label, each.speeds) for each in encoded)
-    generator.speed_edges.copy_(torch.from_numpy(edges))
+    found = speed_rank.speed_edges((each.label, each.speeds) for each in encoded)
+    generator.speed_edges.copy_(torch.from_numpy(found))
+    edges = generator.speed_edges.numpy()
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         chosen = [encoded[i] for i in random.integers(len(encoded), size=BATCH)]
-        loss = generator_loss(
-            generator, *make_batch(config, generator.speed_edges, chosen, random)
-        )
-        return loss, {}
+        return generator_loss(generator, make_batch(config, edges, chosen, random)), {}
 
     run = {
         "network": asdict(config),
@@ -155,18 +152,14 @@ def train_generator(
 
 def make_batch(
     config: GeneratorConfig,
-    edges: Tensor,
+    edges: NDArray[np.floating],
     chosen: Sequence[Codes],
     random: np.random.Generator,
-) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
+) -> Batch:
     """Cuts a window out of each sequence, at random.
 
     The duration that a window is told is drawn too: any stretch of a gait is also
     one of a longer performance.
-
-    Returns:
-        before, labels, speed_bins, duration and codes, as :meth:`Generator.forward`
-        takes them.
     """
     length = config.window + GROWTH
     batch = len(chosen)
@@ -177,7 +170,7 @@ def make_batch(
         start = random.integers(len(sequence) - length)
         windows[i] = sequence.codes[start : start + length + 1]
         speeds = sequence.speeds[start + 1 : start + length + 1]
-        speed_bins[i] = speed_rank.speed_bin(edges.numpy(), sequence.label, speeds)
+        speed_bins[i] = speed_rank.speed_bin(edges, sequence.label, speeds)
     windows[random.random(batch) < NO_HISTORY, 0] = config.codebook_size
     before, codes = windows[:, :-1].copy(), windows[:, 1:].copy()
     labels = np.repeat([[sequence.label] for sequence in chosen], length, axis=1)
@@ -195,16 +188,9 @@ def make_batch(
     )
 
 
-def generator_loss(
-    generator: Generator,
-    before: Tensor,
-    labels: Tensor,
-    speed_bins: Tensor,
-    duration: Tensor,
-    codes: Tensor,
-) -> Tensor:
-    """Returns the mean cross-entropy in nats a code; see :meth:`Generator.forward`."""
-    logits = generator(before, labels, speed_bins, duration, codes)
+def generator_loss(generator: Generator, batch: Batch) -> Tensor:
+    """Returns the mean cross-entropy in nats a code."""
+    logits, codes = generator(*batch), batch[-1]
     return functional.cross_entropy(logits.flatten(0, 2), codes.flatten())
 
 
@@ -214,18 +200,16 @@ def score_generator(
     """Returns the cross-entropy of whole clips in nats a code."""
     total, count = 0.0, 0
     config = generator.config
+    first = torch.full((1, 1, config.codebooks), config.codebook_size)
+    duration = torch.from_numpy(duration_bin(np.array([LONGEST])))
+    edges = generator.speed_edges.numpy()
     for sequence in encode_clips(tokenizer, clips, config.codebooks):
         codes = torch.from_numpy(sequence.codes)[None]
-        first = torch.full((1, 1, config.codebooks), config.codebook_size)
-        labels = torch.full(codes.shape[:2], sequence.label)
-        edges = generator.speed_edges.numpy()
-        bins = speed_rank.speed_bin(edges, sequence.label, sequence.speeds)
-        speed_bins = torch.from_numpy(bins)[None]
-        duration = torch.from_numpy(duration_bin(np.array([LONGEST])))
         before = torch.cat((first, codes[:, :-1]), dim=1)
+        labels = torch.full(codes.shape[:2], sequence.label)
+        bins = speed_rank.speed_bin(edges, sequence.label, sequence.speeds)
+        batch = (before, labels, torch.from_numpy(bins)[None], duration, codes)
         with torch.inference_mode(), single_thread():
-            loss = generator_loss(
-                generator, before, labels, speed_bins, duration, codes
-            )
+            loss = generator_loss(generator, batch)
         total, count = total + float(loss) * codes.numel(), count + codes.numel()
     return total / max(count, 1)

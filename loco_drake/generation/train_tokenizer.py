@@ -5,6 +5,7 @@ replaces dead codes by samples of the batch. The finest codebooks are dropped at
 so that the decoder can use the coarse ones alone.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -25,15 +26,13 @@ from loco_drake.generation.tokenizer_score import Toes
 from loco_drake.generation.training import LoopResult, train
 from loco_drake.generation.training_motions import Clip, Library, training_record
 from loco_drake.generation.windows import WINDOW, PairedWindows
-from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS
 
 Array = NDArray[np.float64]
 
 BATCH = 32  # windows
-FEWEST_CODEBOOKS = (
-    2  # batches are decoded from between so many and all of the codebooks
-)
+# Batches are decoded from between so many and all of the codebooks.
+FEWEST_CODEBOOKS = 2
 
 # Weights of the losses; each is about 1 before training.
 WEIGHTS = {
@@ -57,17 +56,13 @@ class Scales:
     """Scales of the features by label, the units of their errors.
 
     The trunk of a walking horse moves so evenly that in units of the variation between
-    gaits its jitter would have no weight.
-
-    Args:
-        clips: clips to measure; labels without clips get the scales of all.
+    gaits its jitter would have no weight. Labels without clips get the scales of all.
     """
 
     def __init__(self, clips: Sequence[Clip]) -> None:
-        by_label: dict[int, list[Array]] = {}
+        by_label: dict[int, list[Array]] = defaultdict(list)
         for clip in clips:
-            features = clip.features[:, : CONTACTS.start]
-            by_label.setdefault(clip.label.index, []).append(features)
+            by_label[clip.label.index].append(clip.features[:, : CONTACTS.start])
         own = {label: _variances(features) for label, features in by_label.items()}
         everything: Array = np.mean(list(own.values()), axis=0)
         table = np.stack([own.get(i, everything) for i in range(len(LABELS))])
@@ -78,8 +73,8 @@ class Scales:
 
     def __call__(self, label: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Returns those of deviations, changes and jitter, (N, 1, ...), for (N,)."""
-        deviation, change, jitter = self._scales[label].unbind(dim=1)
-        return deviation[:, None], change[:, None], jitter[:, None]
+        deviation, change, jitter = self._scales[label, :, None].unbind(dim=1)
+        return deviation, change, jitter
 
 
 def _variances(clips: Sequence[Array]) -> Array:
@@ -90,11 +85,7 @@ def _variances(clips: Sequence[Array]) -> Array:
 
 
 class LearningTokenizer(nn.Module):
-    """A tokenizer with the quantizer that learns its codebooks.
-
-    Args:
-        tokenizer: trained in place; its own codebooks are set by :meth:`finish`.
-    """
+    """A tokenizer, trained in place, with the quantizer that learns its codebooks."""
 
     def __init__(self, tokenizer: Tokenizer) -> None:
         super().__init__()
@@ -114,17 +105,12 @@ class LearningTokenizer(nn.Module):
     def forward(
         self, features: Tensor, robot: Tensor, decoded_for: Tensor | None = None
     ) -> tuple[Tensor, Tensor]:
-        """Encodes, quantizes and decodes features (B, T, SIZE).
+        """Encodes, quantizes and decodes features (B, T, SIZE) of robots (B,).
 
-        Args:
-            features: frames, whole tokens of them.
-            robot: index of each window's robot, shape (B,).
-            decoded_for: robots to decode the tokens for, shape (R * B,): first one for
-                each window, then a second for each, and so on. None: the windows' own.
-
-        Returns:
-            Reconstructions (R * B, T, SIZE) with contacts as logits, and the commitment
-            loss.
+        The tokens are decoded for the robots ``decoded_for``, shape (R * B,): first one
+        for each window, then a second for each, and so on; None: the windows' own.
+        Returns reconstructions (R * B, T, SIZE) with contacts as logits, and the
+        commitment loss.
         """
         decoded_for = robot if decoded_for is None else decoded_for
         embedded = self.tokenizer.embed(features, robot)
@@ -134,7 +120,7 @@ class LearningTokenizer(nn.Module):
         return output, commitment.mean()
 
     def finish(self) -> Tokenizer:
-        """Returns the tokenizer with the current codebooks."""
+        """Returns the tokenizer after setting its codebooks."""
         self.tokenizer.codebooks.copy_(self.quantizer.codebooks)
         return self.tokenizer.eval()
 
@@ -167,13 +153,13 @@ def train_tokenizer(
         learning.tokenizer.decoder_out.weight.mul_(0.01)
     frames = np.concatenate([clip.features for clip in clips])
     learning.tokenizer.set_statistics(torch.tensor(frames, dtype=torch.float32))
-    toes = Toes([get_robot(name) for name in config.robots])
+    toes = Toes(config.robots)
     windows = PairedWindows(clips, config.robots)
     scales = Scales(clips)
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         target, robot, label = windows(random, BATCH)
-        losses = tokenizer_losses(learning, toes, scales(label), target, robot, BATCH)
+        losses = tokenizer_losses(learning, toes, scales(label), target, robot)
         total = sum(
             (WEIGHTS[name] * loss for name, loss in losses.items()), torch.zeros(())
         )
@@ -202,7 +188,6 @@ def tokenizer_losses(
     scales: tuple[Tensor, Tensor, Tensor],
     target: Tensor,
     robot: Tensor,
-    encoded: int,
 ) -> dict[str, Tensor]:
     """Returns the losses of a batch, unweighted; see :data:`WEIGHTS`.
 
@@ -210,12 +195,11 @@ def tokenizer_losses(
         learning: in training mode its codebooks are updated.
         toes: of the tokenizer's robots.
         scales: of the windows, see :class:`Scales`.
-        target: features, shape (N, T, SIZE).
+        target: features, shape (N, T, SIZE). The first BATCH windows are encoded, and
+            all are to be decoded from their tokens, see :class:`PairedWindows`.
         robot: index of each window's robot, shape (N,).
-        encoded: how many windows are encoded, the first ones; all are what is to come
-            out when their tokens are decoded, see :class:`PairedWindows`.
     """
-    output, commitment = learning(target[:encoded], robot[:encoded], robot)
+    output, commitment = learning(target[:BATCH], robot[:BATCH], robot)
     contacts = output[..., CONTACTS]
     error = (output - target)[..., : CONTACTS.start]
     deviation, change, jitter = scales
@@ -241,12 +225,8 @@ def energy_error(output: Tensor, target: Tensor, jitter: Tensor) -> Tensor:
     """Returns the error of the energy of jitter per window, in logarithmic scale.
 
     A token cannot encode the phase of jitter. The squared error alone would therefore
-    remove jitter; this loss requires it, in any phase.
-
-    Args:
-        output: features, shape (N, T, SIZE).
-        target: features, shape (N, T, SIZE).
-        jitter: scale of jitter, see :class:`Scales`.
+    remove jitter; this loss requires it, in any phase. Features are (N, T, SIZE);
+    ``jitter`` is its scale, see :class:`Scales`.
     """
 
     def energy(features: Tensor) -> Tensor:

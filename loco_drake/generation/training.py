@@ -3,7 +3,6 @@
 import json
 import math
 from collections.abc import Callable, Mapping
-from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +22,7 @@ from loco_drake.common.run_folder import (
     sound,
     stop_requests,
 )
-from loco_drake.generation.loop_settings import LoopSettings
+from loco_drake.generation.loop_settings import RUN_SETTINGS, LoopSettings
 
 # Returns the loss and figures to log for one batch, drawn with the given generator.
 LossFunction = Callable[[np.random.Generator], tuple[Tensor, dict[str, float]]]
@@ -54,15 +53,14 @@ def train(
         name: of checkpoint, weights and progress bar: "tokenizer", "generator", ...
         module: what to train.
         loss_of_batch: see :data:`LossFunction`.
-        config: see there.
+        config: how to train.
         run: what the run depends on besides, as JSON.
 
     Raises:
         InputError: see :func:`loco_drake.common.run_folder.open_run`.
     """
     config.check()
-    own = ("learning_rate", "weight_decay", "seed")
-    run = settings({**{key: getattr(config, key) for key in own}, **run})
+    run = settings({**{key: getattr(config, key) for key in RUN_SETTINGS}, **run})
     run = json.loads(json.dumps(run))  # as a checkpoint gives it back
     optimizer = torch.optim.AdamW(
         module.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
@@ -98,12 +96,12 @@ def train(
         last = math.nan
         # The logs overwrite what a lost run logged later.
         writer = SummaryWriter(str(config.out / "logs"), purge_step=step)
-        with progress_bar() as progress, closing(writer) as logs:
+        with progress_bar() as progress, writer as logs:
             bar = progress.add_task(name, total=config.steps, completed=step, note="")
             while step < config.steps and not stop_requested.is_set():
-                rate = config.learning_rate * _schedule(step / config.steps)
-                for group in optimizer.param_groups:
-                    group["lr"] = rate
+                optimizer.param_groups[0]["lr"] = config.learning_rate * _schedule(
+                    step / config.steps
+                )
                 loss, metrics = loss_of_batch(random)
                 optimizer.zero_grad()
                 loss.backward()  # type: ignore[no-untyped-call]

@@ -1,5 +1,6 @@
 """Motion files as training data."""
 
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.common.weights import load_weights
 from loco_drake.datasets.split import VALIDATION
 from loco_drake.generation.features import motion_features
-from loco_drake.generation.loop_settings import LoopSettings
+from loco_drake.generation.loop_settings import RUN_SETTINGS, LoopSettings
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS, GaitLabel
 from loco_drake.motion.motion import FPS, Motion
@@ -24,22 +25,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """One stretch of motion as features, or its mirror image.
+    """One stretch of motion as features, or its mirror image."""
 
-    Attributes:
-        robot: name of the robot.
-        label: gait label.
-        recording: source and animal, or recording if the animal is unknown; clips of
-            one can overlap and are always in the same set.
-        features: see :mod:`loco_drake.generation.features`, shape (T, SIZE).
-        performance: file, frames and mirroring: equal for all robots to which this
-            stretch was retargeted; empty if unknown.
-    """
-
-    robot: str
+    robot: str  # its name
     label: GaitLabel
+    # Source and animal, or file of an unknown animal. Clips of one may overlap.
     recording: str
-    features: Array
+    features: Array  # see features.py, (T, SIZE)
+    # File, frames and mirroring: the same for all robots; empty if unknown.
     performance: str = ""
 
     def __len__(self) -> int:
@@ -48,15 +41,10 @@ class Clip:
 
 @dataclass(frozen=True)
 class Library:
-    """Clips for training and testing, split by recording.
+    """Clips for training and testing, split by recording."""
 
-    Attributes:
-        train: clips and their mirror images.
-        held_out: clips, not mirrored, of recordings that ``train`` has nothing of.
-    """
-
-    train: tuple[Clip, ...]
-    held_out: tuple[Clip, ...]
+    train: tuple[Clip, ...]  # clips, then their mirror images
+    held_out: tuple[Clip, ...]  # not mirrored, of recordings that are not in ``train``
 
     @property
     def labels(self) -> tuple[GaitLabel, ...]:
@@ -77,14 +65,10 @@ class Library:
 
 
 def load_library(*folders: Path) -> Library:
-    """Reads every Motion file under the folders.
+    """Reads every Motion file ``*.npz`` with one of the fifteen labels in the folders.
 
     The split is the one that ``loco-drake retarget`` wrote into the files
-    (:mod:`loco_drake.datasets.split`); motions without one are for training. Those
-    whose label is not one of the fifteen are left out.
-
-    Args:
-        folders: hold ``*.npz``, in subfolders too; such as one for each robot.
+    (:mod:`loco_drake.datasets.split`); motions without one are for training.
 
     Raises:
         InputError: if there are no motions with a label to train on, one is unsound, or
@@ -126,13 +110,17 @@ def load_library(*folders: Path) -> Library:
 
 def motion_clip(motion: Motion, path: str = "") -> Clip:
     """Returns a motion as a clip; ``path`` identifies a recording without a name."""
-    robot = get_robot(motion.robot)
+    origin = motion.provenance
+    performance = ""
+    if "file" in origin and "frames" in origin:
+        parts = (origin["file"], origin["frames"], origin.get("mirrored", ""))
+        performance = " ".join((str(motion.label), *parts))
     return Clip(
         robot=motion.robot,
         label=motion.label,
         recording=recording_name(motion, path),
-        features=motion_features(robot, motion),
-        performance=_performance(motion),
+        features=motion_features(get_robot(motion.robot), motion),
+        performance=performance,
     )
 
 
@@ -143,51 +131,30 @@ def recording_name(motion: Motion, path: str = "") -> str:
     return f"{motion.source}-{recording}"
 
 
-def _performance(motion: Motion) -> str:
-    origin = motion.provenance
-    if "file" not in origin or "frames" not in origin:
-        return ""
-    parts = (origin["file"], origin["frames"], origin.get("mirrored", ""))
-    return " ".join((str(motion.label), *parts))
+def clip_probabilities(clips: Sequence[Clip]) -> Array:
+    """Returns with which probability to draw each clip.
 
-
-class Sampler:
-    """Samples clips so that every label is seen about equally often.
-
-    The probability of a label grows with the square root of its duration: rare gaits
-    are seen often enough to learn, but not so often that their few clips are memorized.
-    Within a label the probability of a clip is proportional to its length.
-
-    Args:
-        clips: to draw from.
+    That of a label grows with the square root of its duration: rare gaits are seen
+    often enough to learn, but not so often that their few clips are memorized. Within a
+    label the probability of a clip is proportional to its length.
     """
-
-    def __init__(self, clips: Sequence[Clip]) -> None:
-        self.clips = clips
-        time: dict[tuple[str, GaitLabel], int] = {}
-        for clip in clips:
-            key = (clip.robot, clip.label)
-            time[key] = time.get(key, 0) + len(clip)
-        weights = [len(c) / np.sqrt(time[c.robot, c.label]) for c in clips]
-        self.probabilities = np.array(weights) / np.sum(weights)
-
-    def __call__(self, random: np.random.Generator, count: int) -> NDArray[np.int64]:
-        """Returns the indices of ``count`` clips."""
-        return random.choice(len(self.clips), size=count, p=self.probabilities)
+    time: Counter[tuple[str, GaitLabel]] = Counter()
+    for clip in clips:
+        time[clip.robot, clip.label] += len(clip)
+    weights = [len(c) / np.sqrt(time[c.robot, c.label]) for c in clips]
+    return np.array(weights) / np.sum(weights)
 
 
 def training_record(library: Library, settings: LoopSettings) -> dict[str, Any]:
     """Returns the record of a training, as JSON.
 
-    Returns:
-        ``robots``; ``recordings``, the seconds of motion learned from of each subject
-        (a recording, or an animal with all of its own) and robot, mirror images not
-        counted; ``held_out``, the subjects that were not; and the settings.
+    ``recordings`` are the seconds that were learned from of each subject (a recording,
+    or an animal with all of its own) and robot, mirror images not counted; ``held_out``
+    are the subjects that were not.
     """
-    seconds: dict[str, dict[str, float]] = {}
+    seconds: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
     for clip in library.train[: len(library.train) // 2]:  # then come mirror images
-        of_robot = seconds.setdefault(clip.recording, {})
-        of_robot[clip.robot] = of_robot.get(clip.robot, 0.0) + len(clip) / FPS
+        seconds[clip.recording][clip.robot] += len(clip) / FPS
     return {
         "robots": list(library.robots),
         "recordings": {
@@ -195,23 +162,16 @@ def training_record(library: Library, settings: LoopSettings) -> dict[str, Any]:
             for name, of_robot in sorted(seconds.items())
         },
         "held_out": sorted({clip.recording for clip in library.held_out}),
-        "steps": settings.steps,
-        "learning_rate": settings.learning_rate,
-        "weight_decay": settings.weight_decay,
-        "seed": settings.seed,
+        **{name: getattr(settings, name) for name in ("steps", *RUN_SETTINGS)},
         "loco_drake": __version__,
     }
 
 
 def read_training_record(path: Path, kind: str) -> dict[str, Any] | None:
-    """Returns the record in a weights file, None if there is none.
-
-    Args:
-        path: of the weights.
-        kind: "tokenizer" or "generator".
+    """Returns the record in a weights file of a kind, None if there is none.
 
     Raises:
-        InputError: if the file is missing, damaged, or of something else.
+        InputError: if the file is missing, damaged, or of another kind.
     """
     _, config = load_weights(path, kind)
     info = config.get("info")
@@ -223,14 +183,9 @@ def read_training_record(path: Path, kind: str) -> dict[str, Any] | None:
 def seen_in_training(
     record: dict[str, Any] | None, motions: Iterable[Motion]
 ) -> list[str] | None:
-    """Returns which recordings of ``motions`` the weights were trained on.
+    """Returns the subjects of ``motions`` that weights were trained on, sorted.
 
-    Args:
-        record: from :func:`read_training_record`.
-        motions: retargeted recordings.
-
-    Returns:
-        Sorted names of subjects; None if it was not recorded.
+    None if there is no record.
     """
     if record is None:
         return None

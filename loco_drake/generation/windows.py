@@ -1,5 +1,6 @@
 """Windows of clips for training the tokenizer."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from torch import Tensor
 
 from loco_drake.generation.features import CONTACTS, VELOCITY, YAW_RATE
-from loco_drake.generation.training_motions import Clip, Sampler
+from loco_drake.generation.training_motions import Clip, clip_probabilities
 
 Array = NDArray[np.float64]
 
@@ -34,20 +35,16 @@ class PairedWindows:
     def __init__(self, clips: Sequence[Clip], robots: Sequence[str]) -> None:
         self._clips = clips
         self._robots = robots
-        self._sampler = Sampler(clips)
+        self._probabilities = clip_probabilities(clips)
         self._curves = {
             clip: CubicSpline(np.arange(len(clip)), clip.features) for clip in clips
         }
-        together: dict[str, list[Clip]] = {}
+        together: dict[str, list[Clip]] = defaultdict(list)
         for clip in clips:
             if clip.performance:
-                together.setdefault(clip.performance, []).append(clip)
+                together[clip.performance].append(clip)
         self._others = {
-            clip: [
-                other
-                for other in together.get(clip.performance, ())
-                if other.robot != clip.robot
-            ]
+            clip: [c for c in together[clip.performance] if c.robot != clip.robot]
             for clip in clips
         }
         self._paired = any(self._others.values())
@@ -57,12 +54,11 @@ class PairedWindows:
     ) -> tuple[Tensor, Tensor, Tensor]:
         """Returns windows (N, WINDOW, SIZE), their robots (N,) and their labels (N,).
 
-        Labels are indices into gaits.LABELS.
-
-        N is ``count``; or twice as many if there are clips of several robots: then the
-        second half are the same windows of other robots.
+        Labels are indices into gaits.LABELS. N is ``count``; or twice as many if there
+        are clips of several robots: the second half are the same windows of others.
         """
-        chosen = [self._clips[i] for i in self._sampler(random, count)]
+        drawn = random.choice(len(self._clips), size=count, p=self._probabilities)
+        chosen = [self._clips[i] for i in drawn]
         cuts = [draw_cut(len(clip), random) for clip in chosen]
         if self._paired:
             others = [self._others[clip] or [clip] for clip in chosen]
@@ -90,14 +86,9 @@ def draw_cut(frames: int, random: np.random.Generator) -> tuple[float, float]:
 
 
 def cut_window(curve: CubicSpline, start: float, tempo: float) -> Array:
-    """Returns WINDOW frames from ``start`` on, played ``tempo`` times as fast.
+    """Returns WINDOW frames from frame ``start`` on, played ``tempo`` times as fast.
 
-    Feet in stance remain still at any tempo.
-
-    Args:
-        curve: the features of a clip over its frame numbers.
-        start: frame number, not whole.
-        tempo: above 0.
+    The curve is of a clip's features. Feet in stance remain still at any tempo.
     """
     window: Array = curve(start + tempo * np.arange(WINDOW))
     window[:, VELOCITY] *= tempo

@@ -85,7 +85,7 @@ def test_toes_in_torch_agree_with_numpy_kinematics(make_synthetic):
     q = ft.positions(GO2, features, np.zeros((len(motion), 3)))
     expected = quat_rotate(q[:, None, :4], GO2.toe_positions(q[:, 7:]))
     expected += q[:, None, 4:7]
-    toes = Toes([get_robot("a1"), GO2])
+    toes = Toes(["a1", "go2"])
     batch = torch.tensor(features[None], dtype=torch.float32)
     p_HF = toes.positions(batch, torch.tensor([1]))
     np.testing.assert_allclose(p_HF[0].numpy(), expected, atol=1e-6)
@@ -99,7 +99,7 @@ def test_toe_speeds_of_standing_feet_are_zero(make_synthetic):
 
     motion = make_synthetic("dog-trot", 2.0, 0.8, 0.0)
     features = ft.motion_features(GO2, motion)
-    toes, robot = Toes([GO2]), torch.tensor([0])
+    toes, robot = Toes(["go2"]), torch.tensor([0])
     batch = torch.tensor(features[None], dtype=torch.float32)
     v = toes.velocities(batch, toes.positions(batch, robot), robot)[0].numpy()
     standing = motion.contacts[1:] & motion.contacts[:-1]

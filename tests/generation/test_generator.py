@@ -11,8 +11,8 @@ from loco_drake.generation.generator import (
     draw,
     duration_bin,
     load_generator,
+    turn_channels,
 )
-from loco_drake.generation.layers import turn_channels
 from loco_drake.generation.speed_rank import BINS
 
 TINY = GeneratorConfig(

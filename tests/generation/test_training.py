@@ -172,7 +172,7 @@ def test_windows_are_shifted_by_one_token(library, tokenizer):
     config = generator_config(tokenizer)
     encoded = encode_clips(tokenizer, stitched_clips(library.train, 16, 0), codebooks=2)
     random = np.random.default_rng(0)
-    edges = torch.from_numpy(speed_edges((e.label, e.speeds) for e in encoded))
+    edges = speed_edges((e.label, e.speeds) for e in encoded)
     before, labels, speed_bins, duration, codes = make_batch(
         config, edges, encoded, random
     )

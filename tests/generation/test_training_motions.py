@@ -7,7 +7,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.generation.features import SIZE
 from loco_drake.generation.training_motions import (
     Clip,
-    Sampler,
+    clip_probabilities,
     load_library,
 )
 from loco_drake.motion.gaits import parse_label
@@ -67,7 +67,7 @@ def test_labels_are_drawn_by_the_square_root_of_their_time():
     """900 frames against 100: 3 to 1. Within a label by length: 2 to 1."""
     clips = [clip("dog-pace", "a", 600), clip("dog-pace", "b", 300)]
     clips += [clip("dog-trot", "c", 100)]
-    probabilities = Sampler(clips).probabilities
+    probabilities = clip_probabilities(clips)
     np.testing.assert_allclose(probabilities, [0.5, 0.25, 0.25])
 
 
