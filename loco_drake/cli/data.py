@@ -18,13 +18,12 @@ if TYPE_CHECKING:
 class DataList:
     """List the sources of motion with duration, gaits and licence."""
 
+    # Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache folder.
     data_dir: Path | None = None
-    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache
-    folder."""
+    # Write the figures of each source to this JSON file.
     json: Path | None = None
-    """Write the figures of each source to this JSON file."""
+    # Accepted by every command; this one uses no random numbers.
     seed: int = 0
-    """Accepted by every command; this one uses no random numbers."""
 
     def run(self) -> int:
         """Prints the table; returns 0.
@@ -70,22 +69,22 @@ class DataList:
 class DataInspect:
     """Plot toe heights, contacts and speeds of one stretch of a recording."""
 
+    # A recording.
     file: tyro.conf.Positional[Path]
-    """A recording."""
+    # Source whose format the file has: dog, horse, mpc or solo8.
     source: str = "dog"
-    """Source whose format the file has: dog, horse, mpc or solo8."""
+    # First frame, counted from 0 at the file's rate. Default: the first usable one.
     start: int | None = None
-    """First frame, counted from 0 at the file's rate. Default: the first usable one."""
+    # End frame, exclusive. Default: the end of the file.
     end: int | None = None
-    """End frame, exclusive. Default: the end of the file."""
+    # Rate in frames/s. Default: inferred from format, name or motion.
     fps: float | None = None
-    """Rate in frames/s. Default: inferred from format, name or motion."""
+    # PNG file to write. Default: the name of the recording, in the current folder.
     out: Path | None = None
-    """PNG file to write. Default: the name of the recording, in the current folder."""
+    # Write the figures to this JSON file.
     json: Path | None = None
-    """Write the figures to this JSON file."""
+    # Accepted by every command; this one uses no random numbers.
     seed: int = 0
-    """Accepted by every command; this one uses no random numbers."""
 
     def run(self) -> int:
         """Writes the picture and prints the table; returns 0.

@@ -32,17 +32,17 @@ class EvaluateGeneration(Effort, Evaluation):
         "all",
     )
 
+    # Score the Motion files in this folder instead of generating motion.
     motions: Path | None = None
-    """Score the Motion files in this folder instead of generating motion."""
+    # Weights from `train tokenizer`. Default: the shipped weights.
     tokenizer: Path | None = None
-    """Weights from `train tokenizer`. Default: the shipped weights."""
+    # Weights from `train generator`. Default: the shipped weights.
     generator: Path | None = None
-    """Weights from `train generator`. Default: the shipped weights."""
+    # Folder for plots.
     figures: Path | None = None
-    """Folder for plots."""
+    # Seed of the first motion and the first classifier; it increases by 1 for each
+    # further one.
     seed: int = 0
-    """Seed of the first motion and the first classifier; it increases by 1 for each
-    further one."""
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""

@@ -16,16 +16,16 @@ class EvaluateRetargeting(Evaluation):
     docs/retargeting.md. Writes no Motion files.
     """
 
+    # Robot: go2, a1, all (both), or a YAML file that describes another robot.
     robot: str = "go2"
-    """Robot: go2, a1, all (both), or a YAML file that describes another robot."""
+    # Gait labels, such as dog-trot dog-pace. Default: all in segments.csv.
     labels: tuple[str, ...] = ()
-    """Gait labels, such as dog-trot dog-pace. Default: all in segments.csv."""
+    # Exchange left and right.
     mirror: bool = False
-    """Exchange left and right."""
+    # Scale time to keep the animal's Froude number, as `retarget --froude` does.
     froude: bool = False
-    """Scale time to keep the animal's Froude number, as `retarget --froude` does."""
+    # Exit with status 1 if a figure of a clip is outside its bounds.
     strict: bool = False
-    """Exit with status 1 if a figure of a clip is outside its bounds."""
 
     def check(self) -> None:
         """Raises InputError if an option is wrong; labels need not be known ones."""

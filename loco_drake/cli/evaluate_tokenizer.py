@@ -19,12 +19,12 @@ class EvaluateTokenizer(Evaluation):
 
     KEYS = ("labels", "all", "codebook_use")
 
+    # Weights from `train tokenizer`. Default: the shipped weights.
     tokenizer: Path | None = None
-    """Weights from `train tokenizer`. Default: the shipped weights."""
+    # Number of codebooks to decode from, the coarsest first. Default: all.
     books: int | None = None
-    """Number of codebooks to decode from, the coarsest first. Default: all."""
+    # Folder for a plot of codebook usage.
     figures: Path | None = None
-    """Folder for a plot of codebook usage."""
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""

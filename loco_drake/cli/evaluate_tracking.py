@@ -19,40 +19,39 @@ if TYPE_CHECKING:
 class EvaluateTracking(Evaluation):
     """Simulate many episodes and measure how well a policy tracks its references."""
 
+    # Gait labels, such as dog-trot dog-pace. Default: those that the policy was trained
+    # on.
     labels: tuple[str, ...] = ()
-    """Gait labels, such as dog-trot dog-pace. Default: those that the policy was
-    trained on."""
+    # generated, during the simulation, or retargeted, from stretches of the recordings.
     reference: str = "generated"
-    """generated, during the simulation, or retargeted, from stretches of the
-    recordings."""
+    # Number of episodes per label, at most; seeds count up from --seed.
     seeds: int = 20
-    """Number of episodes per label, at most; seeds count up from --seed."""
+    # Length of each episode in s; at most the length of a recording.
     duration: float = 10.0
-    """Length of each episode in s; at most the length of a recording."""
+    # Weights of the policy, or the name of a shipped variant, such as randomized.
+    # Default: the robot's main policy.
     policy: Path | None = None
-    """Weights of the policy, or the name of a shipped variant, such as randomized.
-    Default: the robot's main policy."""
+    # Contact solver: similar, lagged, sap or cenic.
     contact: str = "similar"
-    """Contact solver: similar, lagged, sap or cenic."""
+    # Time step of the physics, s.
     time_step: float = 0.01
-    """Time step of the physics, s."""
+    # Accuracy of the integrator of cenic.
     accuracy: float = 1e-4
-    """Accuracy of the integrator of cenic."""
+    # Coulomb friction coefficient of the ground.
     friction: float = 0.8
-    """Coulomb friction coefficient of the ground."""
+    # Push the trunk repeatedly in random directions.
     pushes: bool = False
-    """Push the trunk repeatedly in random directions."""
+    # With --pushes: change of the robot's velocity by one push, m/s. The force lasts .1
+    # s.
     push_size: float = 1.0
-    """With --pushes: change of the robot's velocity by one push, m/s. The force lasts
-    .1 s."""
+    # With --pushes: time from the start to the first push and between pushes, s.
     push_interval: float = 2.0
-    """With --pushes: time from the start to the first push and between pushes, s."""
+    # Randomize the world of each episode, as `train tracker --randomize` does.
     randomize: bool = False
-    """Randomize the world of each episode, as `train tracker --randomize` does."""
+    # Ranges of single parts; a range is two numbers.
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
-    """Ranges of single parts; a range is two numbers."""
+    # Seed of the first generated reference of each label.
     seed: int = 0
-    """Seed of the first generated reference of each label."""
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""

@@ -28,22 +28,21 @@ class Evaluation:
 
     KEYS: ClassVar[tuple[str, ...]]
 
+    # Robot: go2, a1 or all.
     robot: str = "go2"
-    """Robot: go2, a1 or all."""
+    # Gait labels, such as dog-trot dog-pace. Default: all of the fifteen with
+    # recordings.
     labels: tuple[str, ...] = ()
-    """Gait labels, such as dog-trot dog-pace. Default: all of the fifteen with
-    recordings."""
+    # Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache folder.
     data_dir: Path | None = None
-    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache
-    folder."""
+    # Number of worker processes.
     workers: int = 1
-    """Number of worker processes."""
+    # Accepted by every evaluation; this one is deterministic.
     seeds: int = 1
-    """Accepted by every evaluation; this one is deterministic."""
+    # Accepted by every command; this one uses no random numbers.
     seed: int = 0
-    """Accepted by every command; this one uses no random numbers."""
+    # Write the figures to this JSON file.
     json: Path | None = None
-    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Prints tables for each robot and writes the figures; returns the exit status.

@@ -14,17 +14,17 @@ from loco_drake.common.errors import InputError
 class Export:
     """Write a policy as ONNX, from raw observations to actions, with metadata."""
 
+    # Robot: go2 or a1.
     robot: str = "go2"
-    """Robot: go2 or a1."""
+    # Weights of the policy, or the name of a shipped variant, such as randomized.
+    # Default: the robot's main policy.
     policy: Path | None = None
-    """Weights of the policy, or the name of a shipped variant, such as randomized.
-    Default: the robot's main policy."""
+    # ONNX file to write.
     out: Path = Path("policy.onnx")
-    """ONNX file to write."""
+    # Write the metadata to this JSON file.
     json: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """Write the metadata to this JSON file."""
+    # Accepted by every command; this one uses no random numbers.
     seed: int = 0
-    """Accepted by every command; this one uses no random numbers."""
 
     def run(self) -> int:
         """Writes and prints; returns the exit status."""

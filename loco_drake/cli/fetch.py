@@ -41,18 +41,18 @@ class DataFetch:
     shipped rows to segments.csv and keeps your own.
     """
 
+    # Sources to download, such as dog. Default: all.
     source: tyro.conf.UseAppendAction[tuple[tuple[str, ...], ...]] = ()
-    """Sources to download, such as dog. Default: all."""
+    # Folder for the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache
+    # folder.
     data_dir: Path | None = None
-    """Folder for the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache
-    folder."""
+    # Download from a copy: a folder or an http(s) address with the layout of the data
+    # folder.
     mirror: str | None = None
-    """Download from a copy: a folder or an http(s) address with the layout of the data
-    folder."""
+    # Write the figures of each source to this JSON file.
     json: Path | None = None
-    """Write the figures of each source to this JSON file."""
+    # Accepted by every command; this one uses no random numbers.
     seed: int = 0
-    """Accepted by every command; this one uses no random numbers."""
 
     def run(self) -> int:
         """Fetches what is missing; returns 1 if a file failed, else 0.

@@ -17,32 +17,32 @@ BATCH = 32  # motions side by side
 class Generate:
     """Generate motion of a gait and write Motion files at 50 frames/s."""
 
+    # Gait label, such as dog-pace, or a schedule of labels with start times in s, such
+    # as dog-pace,dog-trot@3,dog-gallop@6.
     gait: str = "dog-trot"
-    """Gait label, such as dog-pace, or a schedule of labels with start times in s, such
-    as dog-pace,dog-trot@3,dog-gallop@6."""
+    # Length of each motion in s, above 0 and at most 600.
     duration: float = 10.0
-    """Length of each motion in s, above 0 and at most 600."""
+    # Number of motions.
     count: int = 1
-    """Number of motions."""
+    # Seed of the first motion; it increases by 1 for each further motion.
     seed: int = 0
-    """Seed of the first motion; it increases by 1 for each further motion."""
+    # Robot: go2 or a1.
     robot: str = "go2"
-    """Robot: go2 or a1."""
+    # Folder for the Motion files.
     out: Path = Path("motions/generated")
-    """Folder for the Motion files."""
+    # Speed rank, from 0 (slowest recorded speed of the gait) to 1 (fastest). Default:
+    # drawn for each seed.
     pace: float | None = None
-    """Speed rank, from 0 (slowest recorded speed of the gait) to 1 (fastest). Default:
-    drawn for each seed."""
+    # Sampling temperature: above 1 more varied, below 1 more typical, 0 greedy.
     temperature: float = 1.0
-    """Sampling temperature: above 1 more varied, below 1 more typical, 0 greedy."""
+    # Sample from the likeliest codes that together have this probability.
     top_p: float = 0.95
-    """Sample from the likeliest codes that together have this probability."""
+    # Weights from `train tokenizer`. Default: the shipped weights.
     tokenizer: Path | None = None
-    """Weights from `train tokenizer`. Default: the shipped weights."""
+    # Weights from `train generator`. Default: the shipped weights.
     generator: Path | None = None
-    """Weights from `train generator`. Default: the shipped weights."""
+    # Write the figures to this JSON file.
     json: Path | None = None
-    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Writes the files and prints the figures; returns 0.

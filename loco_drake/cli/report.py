@@ -20,19 +20,18 @@ class Report:
     page names missing results and the commands that produce them.
     """
 
+    # Folder of results. Default: the shipped results.
     results: Path | None = None
-    """Folder of results. Default: the shipped results."""
+    # HTML file to write.
     out: Path = Path("report.html")
-    """HTML file to write."""
+    # Gaits to simulate and embed for each robot that has a policy; none for no replays.
     replays: tuple[str, ...] = DEFAULT_REPLAYS
-    """Gaits to simulate and embed for each robot that has a policy; none for no
-    replays."""
+    # Length of each replay, s.
     replay_seconds: float = 4.0
-    """Length of each replay, s."""
+    # Seed of the motion in the replays.
     seed: int = 0
-    """Seed of the motion in the replays."""
+    # Write paths and counts to this JSON file.
     json: Path | None = None
-    """Write paths and counts to this JSON file."""
 
     def run(self) -> int:
         """Makes the page; returns 0.

@@ -37,44 +37,43 @@ class Retarget:
     stretches and written to OUT-trajectories.
     """
 
+    # A recording; needs --source and --gait.
     file: tyro.conf.Positional[Path | None] = None
-    """A recording; needs --source and --gait."""
+    # Source of the recordings: dog, horse, mpc or solo8. Default: all.
     source: str | None = None
-    """Source of the recordings: dog, horse, mpc or solo8. Default: all."""
+    # Gait, such as trot; may be repeated. Default: the gaits of the fifteen labels.
     gait: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """Gait, such as trot; may be repeated. Default: the gaits of the fifteen labels."""
+    # Robot: go2, a1, or a YAML file that describes another robot, such as
+    # examples/solo8.yaml; see docs/retargeting.md.
     robot: str = "go2"
-    """Robot: go2, a1, or a YAML file that describes another robot, such as
-    examples/solo8.yaml; see docs/retargeting.md."""
+    # First frame of FILE, counted from 0 at the file's rate. Default: the first usable
+    # one.
     start: int | None = None
-    """First frame of FILE, counted from 0 at the file's rate. Default: the first usable
-    one."""
+    # End frame of FILE, exclusive. Default: the end of the file.
     end: int | None = None
-    """End frame of FILE, exclusive. Default: the end of the file."""
+    # Rate of FILE in frames/s. Default: inferred from format, name or motion.
     fps: float | None = None
-    """Rate of FILE in frames/s. Default: inferred from format, name or motion."""
+    # Exchange left and right.
     mirror: bool = False
-    """Exchange left and right."""
+    # Scale time to keep the animal's Froude number, v^2 / (g h): a robot a quarter as
+    # high as the animal moves in half the time. Default: keep the animal's timing.
     froude: bool = False
-    """Scale time to keep the animal's Froude number, v^2 / (g h): a robot a quarter as
-    high as the animal moves in half the time. Default: keep the animal's timing."""
+    # Folder for the Motion files. Default: motions/ROBOT, with the suffixes -mirrored
+    # and -froude for these options.
     out: Path | None = None
-    """Folder for the Motion files. Default: motions/ROBOT, with the suffixes -mirrored
-    and -froude for these options."""
+    # Number of 2 s trajectories for each of the fifteen labels, at most; 0 for none.
+    # None are cut with FILE.
     trajectories: int = 10
-    """Number of 2 s trajectories for each of the fifteen labels, at most; 0 for none.
-    None are cut with FILE."""
+    # Number of worker processes.
     workers: int = 1
-    """Number of worker processes."""
+    # Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache folder.
     data_dir: Path | None = None
-    """Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache
-    folder."""
+    # Exit with status 1 if a figure of a clip is outside its bounds.
     strict: bool = False
-    """Exit with status 1 if a figure of a clip is outside its bounds."""
+    # Write the figures of each clip to this JSON file.
     json: Path | None = None
-    """Write the figures of each clip to this JSON file."""
+    # Seed of the split and of the choice of trajectories.
     seed: int = 0
-    """Seed of the split and of the choice of trajectories."""
 
     def run(self) -> int:
         """Writes the files and prints the table; returns the exit status.

@@ -33,38 +33,38 @@ def _default(value: str, metavar: str) -> Any:
 class Simulate:
     """Simulate a robot in Drake that tracks generated motion or a Motion file."""
 
+    # Robot: go2 or a1.
     robot: Annotated[str | None, _default("go2", "STR")] = None
-    """Robot: go2 or a1."""
+    # Gait label, such as dog-trot, or a schedule of labels with start times in s, such
+    # as dog-pace,dog-trot@3. Ignored with a Motion file.
     gait: Annotated[str | None, _default("dog-trot", "STR")] = None
-    """Gait label, such as dog-trot, or a schedule of labels with start times in s, such
-    as dog-pace,dog-trot@3. Ignored with a Motion file."""
+    # Seconds to simulate; at most the length of a Motion file.
     duration: Annotated[float | None, _default("10.0", "FLOAT")] = None
-    """Seconds to simulate; at most the length of a Motion file."""
+    # Seed of the generated motion.
     seed: Annotated[int | None, _default("0", "INT")] = None
-    """Seed of the generated motion."""
+    # gpt, to generate motion during the simulation, or the path of a Motion file.
     reference: Annotated[str | None, _default("gpt", "STR")] = None
-    """gpt, to generate motion during the simulation, or the path of a Motion file."""
+    # Weights of the policy, or the name of a shipped variant, such as randomized.
     policy: Annotated[Path | None, _default("the robot's main one", "PATH")] = None
-    """Weights of the policy, or the name of a shipped variant, such as randomized."""
+    # Show the simulation in the browser, at most at real-time speed.
     meshcat: bool = True
-    """Show the simulation in the browser, at most at real-time speed."""
+    # Meshcat's port. Default: a free one, also if the port is in use.
     port: int | None = None
-    """Meshcat's port. Default: a free one, also if the port is in use."""
+    # Save a replay as one HTML page.
     html: Path | None = None
-    """Save a replay as one HTML page."""
+    # Contact solver: similar, lagged, sap or cenic.
     contact: Annotated[str | None, _default("similar", "STR")] = None
-    """Contact solver: similar, lagged, sap or cenic."""
+    # Time step of the physics, s.
     time_step: Annotated[float | None, _default("0.01", "FLOAT")] = None
-    """Time step of the physics, s."""
+    # Coulomb friction coefficient of the ground.
     friction: Annotated[float | None, _default("0.8", "FLOAT")] = None
-    """Coulomb friction coefficient of the ground."""
+    # Scenario in YAML, see loco_drake.systems.scenario. Its fields replace the defaults
+    # of the options above; options that are given take precedence.
     scenario: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """Scenario in YAML, see loco_drake.systems.scenario. Its fields replace the
-    defaults of the options above; options that are given take precedence."""
+    # YAML that overrides fields of the scenario, as in "plant: {accuracy: 1.0e-4}".
     overlay: Annotated[str | None, tyro.conf.arg(metavar="TEXT")] = None
-    """YAML that overrides fields of the scenario, as in "plant: {accuracy: 1.0e-4}"."""
+    # Write the figures to this JSON file.
     json: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Simulates, prints and writes; returns the exit status."""

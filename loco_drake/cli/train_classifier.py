@@ -21,17 +21,17 @@ class TrainClassifier(LoopSettings):
     """
 
     NAME: ClassVar[str] = "classifier"
+    # Folder of Motion files written by `retarget`; motions of the validation set are
+    # held out for testing.
     motions: Path = Path("motions/go2")
-    """Folder of Motion files written by `retarget`; motions of the validation set are
-    held out for testing."""
+    # Folder for classifier.safetensors, the checkpoint and logs.
     out: Path = Path("runs/classifier")
-    """Folder for classifier.safetensors, the checkpoint and logs."""
+    # Total optimizer steps.
     steps: int = 300
-    """Total optimizer steps."""
+    # Peak learning rate.
     learning_rate: float = 1e-3
-    """Peak learning rate."""
+    # Write the figures to this JSON file.
     json: Path | None = None
-    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Trains; returns 1 if it was stopped before its last step, else 0.

@@ -19,25 +19,25 @@ class TrainGenerator(LoopSettings):
     """
 
     NAME: ClassVar[str] = "generator"
+    # Folders of the Motion files that the tokenizer was trained on.
     motions: tuple[Path, ...] = (Path("motions/go2"),)
-    """Folders of the Motion files that the tokenizer was trained on."""
+    # Weights from `train tokenizer`.
     tokenizer: Path = Path("runs/tokenizer/tokenizer.safetensors")
-    """Weights from `train tokenizer`."""
+    # Folder for generator.safetensors, the checkpoint and logs.
     out: Path = Path("runs/generator")
-    """Folder for generator.safetensors, the checkpoint and logs."""
+    # Number of codebooks to generate, the coarsest first. Finer codebooks encode detail
+    # that is too irregular to predict.
     books: int = 8
-    """Number of codebooks to generate, the coarsest first. Finer codebooks encode
-    detail that is too irregular to predict."""
+    # Total optimizer steps.
     steps: int = 6000
-    """Total optimizer steps."""
+    # Number of 20 s motions per gait to assemble from the training clips.
     stitched: int = 50
-    """Number of 20 s motions per gait to assemble from the training clips."""
+    # Peak learning rate.
     learning_rate: float = 1e-3
-    """Peak learning rate."""
+    # Weight decay of AdamW.
     weight_decay: float = 0.1
-    """Weight decay of AdamW."""
+    # Write the figures to this JSON file.
     json: Path | None = None
-    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Trains; returns 1 if it was stopped before its last step, else 0.

@@ -18,17 +18,17 @@ class TrainTokenizer(LoopSettings):
     """
 
     NAME: ClassVar[str] = "tokenizer"
+    # Folders of Motion files written by `retarget`, one for each robot; motions of the
+    # validation set are held out for testing.
     motions: tuple[Path, ...] = (Path("motions/go2"),)
-    """Folders of Motion files written by `retarget`, one for each robot; motions of the
-    validation set are held out for testing."""
+    # Folder for tokenizer.safetensors, the checkpoint and logs.
     out: Path = Path("runs/tokenizer")
-    """Folder for tokenizer.safetensors, the checkpoint and logs."""
+    # Total optimizer steps.
     steps: int = 9000
-    """Total optimizer steps."""
+    # Peak learning rate.
     learning_rate: float = 2e-3
-    """Peak learning rate."""
+    # Write the figures to this JSON file.
     json: Path | None = None
-    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Trains; returns 1 if it was stopped before its last step, else 0.

@@ -22,21 +22,21 @@ class TrainTracker(TrainingConfig):
     """
 
     NAME: ClassVar[str] = "tracker"
+    # Folder of Motion files to track, such as `generate` writes. Required
+    # without --resume.
     references: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """Folder of Motion files to track, such as `generate` writes. Required without
-    --resume."""
+    # Folder for the checkpoint, policy and TensorBoard logs.
     out: Path = Path("runs/tracker")
-    """Folder for the checkpoint, policy and TensorBoard logs."""
+    # Randomize friction, masses, motors, latency, pushes and sensor noise in each
+    # episode. Parts without a range of their own use the standard range.
     randomize: bool = False
-    """Randomize friction, masses, motors, latency, pushes and sensor noise in each
-    episode. Parts without a range of their own use the standard range."""
+    # A checkpoint.safetensors of any robot whose networks to start from.
     start_from: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """A checkpoint.safetensors of any robot whose networks to start from."""
+    # Continue from the checkpoint in --out with the options of that run. Only --steps
+    # may increase.
     resume: bool = False
-    """Continue from the checkpoint in --out with the options of that run. Only --steps
-    may increase."""
+    # Write the figures to this JSON file.
     json: Path | None = None
-    """Write the figures to this JSON file."""
 
     def run(self) -> int:
         """Trains, prints and writes; returns the exit status."""

@@ -9,16 +9,16 @@ from loco_drake.common.errors import check_at_least
 class Effort:
     """Sample sizes of ``evaluate generation``."""
 
+    # Generated trajectories of 2 s per label and set.
     count: int = 24
-    """Generated trajectories of 2 s per label and set."""
+    # Number of sets of generated trajectories.
     generator_seeds: int = 3
-    """Number of sets of generated trajectories."""
+    # Motions of 60 s per label for measuring drift; 0 to skip it.
     minutes: int = 16
-    """Motions of 60 s per label for measuring drift; 0 to skip it."""
+    # Classifiers to train for each figure.
     seeds: int = 5
-    """Classifiers to train for each figure."""
+    # Optimizer steps of the transformer.
     steps: int = 300
-    """Optimizer steps of the transformer."""
 
     def check(self) -> None:
         """Raises InputError unless all can be done."""

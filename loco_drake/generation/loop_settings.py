@@ -13,24 +13,24 @@ RUN_SETTINGS = ("learning_rate", "weight_decay", "seed")
 class LoopSettings:
     """Settings of :func:`loco_drake.generation.training.train`."""
 
+    # Folder for the weights, the checkpoint and TensorBoard logs.
     out: Path
-    """Folder for the weights, the checkpoint and TensorBoard logs."""
+    # Total optimizer steps, including those before --resume.
     steps: int
-    """Total optimizer steps, including those before --resume."""
+    # Peak learning rate: warms up over the first 2 % of the steps, then decays to 0 as
+    # a half cosine.
     learning_rate: float
-    """Peak learning rate: warms up over the first 2 % of the steps, then decays to 0 as
-    a half cosine."""
+    # Weight decay of AdamW.
     weight_decay: float = 0.01
-    """Weight decay of AdamW."""
+    # Seed of the initial weights and the batches.
     seed: int = 0
-    """Seed of the initial weights and the batches."""
+    # Continue from the checkpoint in --out with the options of that run. Only --steps
+    # may increase.
     resume: bool = False
-    """Continue from the checkpoint in --out with the options of that run. Only --steps
-    may increase."""
+    # Optimizer steps between checkpoints.
     checkpoint_every: int = 500
-    """Optimizer steps between checkpoints."""
+    # Optimizer steps between log entries.
     log_every: int = 20
-    """Optimizer steps between log entries."""
 
     def check(self) -> None:
         """Raises InputError unless every setting can be used."""

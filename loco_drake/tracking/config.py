@@ -24,10 +24,10 @@ class TerminationConfig:
     errors of the base terminate episodes as well (Bogdanovic et al. 2022 and others).
     """
 
+    # Distance between the base and the plan's base, m.
     position: float = 0.35
-    """Distance between the base and the plan's base, m."""
+    # Angle between the base and the plan's base, rad.
     rotation: float = 0.8
-    """Angle between the base and the plan's base, rad."""
 
     def check(self) -> None:
         """Raises InputError unless both are above 0."""
@@ -57,17 +57,15 @@ class ResetNoise:
 
     Starting beside the plan teaches the policy to return to it. Without this noise a
     policy that is pushed off the plan stays beside it.
-
-    Attributes:
-        joints: joint angles, rad.
-        velocities: velocities of joints (rad/s) and base (rad/s and m/s).
-        position: position of the base along x and y, m.
-        heading: heading of the base, rad; its velocity turns with it.
     """
 
+    # Joint angles, rad.
     joints: float = 0.02
+    # Velocities of joints (rad/s) and base (rad/s and m/s).
     velocities: float = 0.1
+    # Position of the base along x and y, m.
     position: float = 0.1
+    # Heading of the base, rad; its velocity turns with it.
     heading: float = 0.1
 
     def draw(self, state: Array, random: np.random.Generator) -> Array:
@@ -86,25 +84,24 @@ class ResetNoise:
 class EnvironmentConfig:
     """Configuration of an environment, without its plans."""
 
+    # Robot: go2 or a1.
     robot: str = "go2"
-    """Robot: go2 or a1."""
+    # Contact solver, time step and friction.
     plant: PlantConfig = field(default_factory=PlantConfig)
-    """Contact solver, time step and friction."""
+    # Distance from the plan at which an episode ends.
     termination: TerminationConfig = field(default_factory=TerminationConfig)
-    """Distance from the plan at which an episode ends."""
+    # Steps after which an episode is truncated.
     episode_steps: int = 200
-    """Steps after which an episode is truncated."""
+    # Standard deviations of the initial state about the plan.
     reset_noise: ResetNoise = field(default_factory=ResetNoise)
-    """Standard deviations of the initial state about the plan."""
+    # Training penalty per step and per metre of distance from the plan, 1/m. The
+    # reward's own term is flat beyond half a metre. Reported returns do not include it.
     position_penalty: Annotated[float, tyro.conf.arg(aliases=("--homing",))] = 0.0
-    """Training penalty per step and per metre of distance from the plan, 1/m. The
-    reward's own term is flat beyond half a metre. Reported returns do not include
-    it."""
+    # Training cost of a fall in perfect steps, beyond the steps that it loses. Reported
+    # returns do not include it.
     fall_cost: float = 0.0
-    """Training cost of a fall in perfect steps, beyond the steps that it loses.
-    Reported returns do not include it."""
+    # Domain randomization; a range is two numbers.
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
-    """Domain randomization; a range is two numbers."""
 
     def check(self) -> None:
         """Raises InputError unless every part is sound."""
@@ -138,32 +135,32 @@ class EnvironmentConfig:
 class PpoConfig:
     """Configuration of PPO."""
 
+    # Environment steps per update. An interruption loses at most one batch.
     batch: int = 4096
-    """Environment steps per update. An interruption loses at most one batch."""
+    # Environment steps per minibatch.
     minibatch: int = 1024
-    """Environment steps per minibatch."""
+    # Epochs per batch.
     epochs: int = 5
-    """Epochs per batch."""
+    # Discount factor per step.
     gamma: float = 0.97
-    """Discount factor per step."""
+    # Lambda of generalized advantage estimation.
     gae_lambda: float = 0.95
-    """Lambda of generalized advantage estimation."""
+    # Clipping range of the probability ratio.
     clip: float = 0.2
-    """Clipping range of the probability ratio."""
+    # Initial learning rate of the actor.
     actor_rate: float = 5e-4
-    """Initial learning rate of the actor."""
+    # KL divergence per update that the actor's learning rate is adapted to (Schulman et
+    # al. 2017; Rudin et al. 2022).
     target_kl: float = 0.02
-    """KL divergence per update that the actor's learning rate is adapted to (Schulman
-    et al. 2017; Rudin et al. 2022)."""
+    # Learning rate of the critic.
     critic_rate: float = 1e-3
-    """Learning rate of the critic."""
+    # Initial log standard deviation of the actions.
     log_std: float = -0.7
-    """Initial log standard deviation of the actions."""
+    # Widths of the hidden layers, of actor and critic each.
     hidden: list[int] = field(default_factory=lambda: [256, 128])
-    """Widths of the hidden layers, of actor and critic each."""
+    # Whether the policy observes position and velocity of the base, which a real robot
+    # does not know well. The critic always does.
     privileged: bool = True
-    """Whether the policy observes position and velocity of the base, which a real robot
-    does not know well. The critic always does."""
 
     def check(self, environments: int) -> None:
         """Raises InputError unless it fits so many environments."""
@@ -188,20 +185,20 @@ class PpoConfig:
 class TrainingConfig:
     """Configuration of a training."""
 
+    # Total environment steps of 20 ms each, including those before --resume.
     steps: int = 2_000_000
-    """Total environment steps of 20 ms each, including those before --resume."""
+    # Number of simulation processes.
     workers: int = 2
-    """Number of simulation processes."""
+    # Environments per process.
     per_worker: int = 8
-    """Environments per process."""
+    # Seed of all random numbers.
     seed: int = 0
-    """Seed of all random numbers."""
+    # The environment.
     environment: Annotated[EnvironmentConfig, tyro.conf.arg(name="")] = field(
         default_factory=EnvironmentConfig
     )
-    """The environment."""
+    # The learner.
     ppo: Annotated[PpoConfig, tyro.conf.arg(name="")] = field(default_factory=PpoConfig)
-    """The learner."""
 
     def check(self) -> None:
         """Raises InputError unless a training can begin."""

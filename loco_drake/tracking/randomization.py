@@ -50,26 +50,26 @@ class RandomizationConfig:
     each part and the sources of the ranges in STANDARD.
     """
 
+    # Coulomb friction coefficient of the ground. A contact uses the harmonic mean with
+    # the feet's .8.
     friction: tuple[float, float] | None = None
-    """Coulomb friction coefficient of the ground. A contact uses the harmonic mean with
-    the feet's .8."""
+    # Stiffness of the ground in N/m, log-uniform; in series with the feet's 5e4.
     stiffness: tuple[float, float] | None = None
-    """Stiffness of the ground in N/m, log-uniform; in series with the feet's 5e4."""
+    # Mass added to the trunk in kg; may be negative.
     payload: tuple[float, float] | None = None
-    """Mass added to the trunk in kg; may be negative."""
+    # Shift of the trunk's centre of mass along each of its axes, m.
     com_shift: tuple[float, float] | None = None
-    """Shift of the trunk's centre of mass along each of its axes, m."""
+    # Torque of each motor over that of its model.
     motor_strength: tuple[float, float] | None = None
-    """Torque of each motor over that of its model."""
+    # Delay of the set-points in s, rounded to whole time steps.
     latency: tuple[float, float] | None = None
-    """Delay of the set-points in s, rounded to whole time steps."""
+    # Change of the robot's velocity by a push in a random horizontal direction, m/s.
+    # The force lasts .1 s.
     push: tuple[float, float] | None = None
-    """Change of the robot's velocity by a push in a random horizontal direction, m/s.
-    The force lasts .1 s."""
+    # Time from the start to the first push and between pushes, s.
     push_interval: tuple[float, float] = (1.0, 3.0)
-    """Time from the start to the first push and between pushes, s."""
+    # Sensor errors, as a multiple of the standard deviations in docs/tracking.md.
     noise: float | None = None
-    """Sensor errors, as a multiple of the standard deviations in docs/tracking.md."""
 
     def check(
         self, robot: "Robot | None" = None, plant: "PlantConfig | None" = None

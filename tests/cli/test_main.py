@@ -4,6 +4,7 @@ import json
 import os
 import re
 import stat
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -241,6 +242,22 @@ def test_help_of_each_command_has_seed_and_json(name, capsys):
     printed = capsys.readouterr().out
     for option in ("--seed INT", "--json"):
         assert option in printed
+
+
+@pytest.mark.parametrize("name", _COMMANDS)
+def test_help_of_each_option_is_one_paragraph(name, capsys, monkeypatch):
+    """A line ends only where the first word of the next has no place."""
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        main([*name.split(), "--help"])
+    printed = capsys.readouterr().out
+    options = printed[printed.index(" options  ") :].splitlines()
+    lines = [line.rstrip() for line in options if line.startswith("  ")]
+    assert len(lines) > 5
+    for line, after in pairwise(lines):
+        only_a_name = line.strip().startswith("-") and "  " not in line.strip()
+        if after.startswith(" " * 10) and not only_a_name:
+            assert len(line) + 1 + len(after.split()[0]) > 78, line
 
 
 def test_help_of_simulate_has_units_and_defaults(capsys):
