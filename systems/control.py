@@ -4,9 +4,12 @@ from typing import Any
 
 import torch
 from pydrake.common.value import AbstractValue, Value
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import (
     AbstractParameterIndex,
     Context,
+    Diagram,
     LeafSystem,
     State,
 )
@@ -75,6 +78,13 @@ class RobotState(LeafSystem):
 
     def _calc(self, context: Context, output: Any) -> None:
         output.set_value(unit_base(self._state.Eval(context)))
+
+
+def FindRobot(diagram: Diagram) -> tuple[Robot, MultibodyPlant, ModelInstanceIndex]:
+    """Returns robot, plant and the robot's instance in it, of a locomotion diagram."""
+    robot = diagram.GetSubsystemByName("robot_state").robot
+    plant = diagram.GetSubsystemByName("plant")
+    return robot, plant, plant.GetModelInstanceByName(robot.name)
 
 
 class _PlanFollower(LeafSystem):

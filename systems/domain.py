@@ -19,7 +19,6 @@ from pydrake.systems.framework import (
     Context,
     Diagram,
     DiscreteValues,
-    EventStatus,
     LeafSystem,
 )
 
@@ -38,6 +37,8 @@ from loco_drake.models.parameters import (
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import Robot
 
+from .control import FindRobot
+
 Array = NDArray[np.float64]
 
 DISTURBING_SYSTEMS = ("actuation", "pushes", "sensors")
@@ -49,10 +50,8 @@ class DomainSystem(LeafSystem):
 
     def __init__(self) -> None:
         super().__init__()
-        self._index = AbstractParameterIndex(
-            self.DeclareAbstractParameter(Value(Domain()))
-        )
-        self._domain_ticket = self.abstract_parameter_ticket(self._index)
+        default = Value(Domain())
+        self._index = AbstractParameterIndex(self.DeclareAbstractParameter(default))
 
     def SetDomain(self, context: Context, domain: Domain) -> None:
         """Sets the domain in ``context``, which is this system's own."""
@@ -94,41 +93,21 @@ class Actuation(DomainSystem):
     both terms. Under "cenic" h is 0, and the rotor inertia does not change. The effort
     limits do not change either: a weak motor has less torque at the same command, but
     the same maximum.
-
-    Args:
-        robot: the robot.
-        plant: time step and contact.
     """
 
     def __init__(self, robot: Robot, plant: PlantConfig) -> None:
         super().__init__()
-        size = len(robot.joint_names)
-        self._size = size
-        self._time_step = plant.time_step
-        self._continuous = plant.contact == "cenic"
-        h = 0.0 if self._continuous else plant.time_step
-        self._prediction = h + robot.kd / robot.kp
         self._robot, self._plant = robot, plant
-        self._surplus = surplus_inertia(robot, plant)
-        self._desired = self.DeclareVectorInputPort("desired_state", 2 * size)
-        self._state = self.DeclareVectorInputPort("state", 13 + 2 * size)
+        self._joints = joints = len(robot.joint_names)
+        h = 0.0 if plant.contact == "cenic" else plant.time_step
+        self._prediction = h + robot.kd / robot.kp
+        self._desired = self.DeclareVectorInputPort("desired_state", 2 * joints)
+        self._state = self.DeclareVectorInputPort("state", 13 + 2 * joints)
         # Set-points of recent steps, newest first; NaN before the first.
         rows = round(MAX_LATENCY / plant.time_step) + 1
-        self._past = self.DeclareDiscreteState(np.full(rows * size, np.nan))
-        self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=plant.time_step, offset_sec=0.0, update=self._remember
-        )
-        self.DeclareVectorOutputPort(
-            "desired_state",
-            2 * size,
-            self._calc,
-            prerequisites_of_calc={
-                self._desired.ticket(),
-                self._state.ticket(),
-                self.discrete_state_ticket(self._past),
-                self._domain_ticket,
-            },
-        )
+        self._past = int(self.DeclareDiscreteState(np.full(rows * joints, np.nan)))
+        self.DeclarePeriodicDiscreteUpdateEvent(plant.time_step, 0.0, self._remember)
+        self.DeclareVectorOutputPort("desired_state", 2 * joints, self._calc)
 
     def reflected_inertia(self, strength: Array) -> Array:
         """Returns the rotor inertia at the joints for this strength, kg m^2, (12,).
@@ -138,19 +117,16 @@ class Actuation(DomainSystem):
                 :func:`loco_drake.models.parameters.least_strength`.
         """
         check_strength(self._robot, self._plant, float(np.min(strength)))
-        return self._robot.reflected_inertia - (1 - strength) * self._surplus
+        surplus = surplus_inertia(self._robot, self._plant)
+        return self._robot.reflected_inertia - (1 - strength) * surplus
 
-    def _remember(self, context: Context, values: DiscreteValues) -> EventStatus:
+    def _remember(self, context: Context, values: DiscreteValues) -> None:
         if self._domain(context).latency == 0:
-            return EventStatus.DidNothing()
-        past = values.get_mutable_value(int(self._past))
-        now = self._desired.Eval(context)[: self._size]
-        if np.isnan(past[0]):
-            past[:] = np.tile(now, len(past) // self._size)
-        else:
-            past[self._size :] = past[: -self._size].copy()
-            past[: self._size] = now
-        return EventStatus.Succeeded()
+            return
+        past = values.get_mutable_value(self._past).reshape(-1, self._joints)
+        first = np.isnan(past[0, 0])
+        past[1:] = past[:-1].copy()
+        past[: len(past) if first else 1] = self._desired.Eval(context)[: self._joints]
 
     def _calc(self, context: Context, output: Any) -> None:
         domain = self._domain(context)
@@ -159,18 +135,17 @@ class Actuation(DomainSystem):
             q, v = split(self._state.Eval(context))
             rest = q[JOINTS] + self._prediction * v[JOINT_VELOCITIES]
             q_d = domain.strength * q_d + (1 - domain.strength) * rest
-        output.set_value(np.concatenate((q_d, np.zeros(self._size))))
+        output.set_value(np.concatenate((q_d, np.zeros(self._joints))))
 
     def _delayed(self, context: Context, domain: Domain) -> Array:
-        now = self._desired.Eval(context)[: self._size]
-        steps = round(domain.latency / self._time_step)
+        now = self._desired.Eval(context)[: self._joints]
+        steps = round(domain.latency / self._plant.time_step)
         if steps == 0:
             return now
-        past = context.get_discrete_state(int(self._past)).value()
+        past = context.get_discrete_state(self._past).value().reshape(-1, self._joints)
         # A discrete plant steps together with _remember and sees the state before it; a
         # continuous plant steps after it.
-        first = (steps if self._continuous else steps - 1) * self._size
-        value = past[first : first + self._size]
+        value = past[steps if self._plant.contact == "cenic" else steps - 1]
         return now if np.isnan(value[0]) else value
 
 
@@ -185,9 +160,6 @@ class Pushes(DomainSystem):
 
     A discrete plant samples the forces at the beginning of its steps. A push that
     starts at a step and lasts whole steps has exactly the impulse force times duration.
-
-    Args:
-        trunk: the body to push.
     """
 
     def __init__(self, trunk: BodyIndex) -> None:
@@ -197,7 +169,6 @@ class Pushes(DomainSystem):
             "spatial_forces",
             lambda: Value[list[ExternallyAppliedSpatialForce]](),
             self._calc,
-            prerequisites_of_calc={self.time_ticket(), self._domain_ticket},
         )
 
     def _calc(self, context: Context, output: Any) -> None:
@@ -229,16 +200,7 @@ class Sensors(DomainSystem):
         super().__init__()
         size = 13 + 2 * len(robot.joint_names)
         self._state = self.DeclareVectorInputPort("state", size)
-        self.DeclareVectorOutputPort(
-            "state",
-            size,
-            self._calc,
-            prerequisites_of_calc={
-                self.time_ticket(),
-                self._state.ticket(),
-                self._domain_ticket,
-            },
-        )
+        self.DeclareVectorOutputPort("state", size, self._calc)
 
     def _calc(self, context: Context, output: Any) -> None:
         state = self._state.Eval(context)
@@ -270,10 +232,8 @@ def SetDomain(diagram: Diagram, context: Context, domain: Domain) -> None:
                 f"This domain needs a scenario with the disturbance {name}: "
                 f"Scenario(disturbances=Disturbances({name}=True))."
             )
-    plant = diagram.GetSubsystemByName("plant")
+    robot, plant, instance = FindRobot(diagram)
     plant_context = plant.GetMyMutableContextFromRoot(context)
-    robot = diagram.GetSubsystemByName("robot_state").robot
-    instance = plant.GetModelInstanceByName(robot.name)
     if domain.friction is not None or domain.stiffness is not None:
         scene_graph = diagram.GetSubsystemByName("scene_graph")
         SetGround(
@@ -294,7 +254,6 @@ def SetDomain(diagram: Diagram, context: Context, domain: Domain) -> None:
         actuation = diagram.GetSubsystemByName("actuation")
         inertia = actuation.reflected_inertia(domain.strength)
         SetReflectedInertia(plant, instance, plant_context, inertia)
-    for name in DISTURBING_SYSTEMS:
-        if diagram.HasSubsystemNamed(name):
-            system = diagram.GetSubsystemByName(name)
-            system.SetDomain(system.GetMyMutableContextFromRoot(context), domain)
+    for name in filter(diagram.HasSubsystemNamed, DISTURBING_SYSTEMS):
+        system = diagram.GetSubsystemByName(name)
+        system.SetDomain(system.GetMyMutableContextFromRoot(context), domain)

@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import (
     ExtractSimulatorConfig,
     Simulator,
@@ -18,6 +17,7 @@ from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.state import unit_base
 from loco_drake.models.plant import ConfigureSimulator
 
+from .control import FindRobot, PlanPlayer
 from .domain import SetDomain
 from .scenario import Scenario
 
@@ -38,14 +38,7 @@ class LocomotionSimulator(Simulator):
 
     def __init__(self, diagram: Diagram) -> None:
         super().__init__(diagram)
-        self._robots = [
-            (plant, plant.GetModelInstanceByName(part.robot.name))
-            for part, plant in (
-                (each.GetSubsystemByName("robot_state"), _plant(each))
-                for each in _locomotions(diagram)
-            )
-            if plant.time_step() > 0  # CENIC normalizes
-        ]
+        self._robots = [FindRobot(part)[1:] for part in _locomotions(diagram)]
 
     def AdvanceTo(
         self, boundary_time: float, interruptible: bool = True
@@ -71,6 +64,8 @@ class LocomotionSimulator(Simulator):
 
     def _normalize(self, root: Context) -> None:
         for plant, instance in self._robots:
+            if plant.time_step() == 0:
+                continue  # CENIC normalizes
             context = plant.GetMyMutableContextFromRoot(root)
             q = plant.GetPositions(context, instance)
             unit = unit_base(q)
@@ -98,7 +93,7 @@ def MakeSimulator(diagram: Diagram, scenario: Scenario) -> LocomotionSimulator:
     scenario.check()
     continuous = scenario.plant.contact == "cenic"
     for part in parts:
-        if (_plant(part).time_step() == 0) != continuous:
+        if _is_continuous(part) != continuous:
             raise InputError(
                 f"The diagram was not made of this scenario, whose contact is "
                 f"{scenario.plant.contact}."
@@ -152,7 +147,7 @@ def StartEpisode(
         )
     chosen = diagram or parts[0]
     scheme = ExtractSimulatorConfig(simulator).integration_scheme
-    if scheme != "cenic" and any(_plant(p).time_step() == 0 for p in parts):
+    if scheme != "cenic" and any(map(_is_continuous, parts)):
         raise InputError(
             f"The plant is continuous, and the integrator {scheme} would take a "
             "million steps a second for its contacts: make the simulator with "
@@ -176,18 +171,16 @@ def _set_reference(diagram: Diagram, root: Context, **given: Any) -> None:
     takes: set[str] = set()
     if diagram.HasSubsystemNamed("reference"):
         reference = diagram.GetSubsystemByName("reference")
-        takes = {"plan"} if hasattr(reference, "SetPlan") else {"gait", "seed"}
+        plays = isinstance(reference, PlanPlayer)
+        takes = {"plan"} if plays else {"gait", "seed"}
     if given.keys() - takes:
         raise InputError(
             f"This scenario's reference takes no {' or '.join(given.keys() - takes)}: "
             "a GeneratedReference takes gait and seed, "
             "a MotionReference or PlanReference takes plan."
         )
-    context = reference.GetMyMutableContextFromRoot(root)
-    if takes == {"plan"}:
-        reference.SetPlan(context, **given)
-    else:
-        reference.SetReference(context, **given)
+    start = reference.SetPlan if plays else reference.SetReference
+    start(reference.GetMyMutableContextFromRoot(root), **given)
 
 
 def _place_on_plan(diagram: Diagram, root: Context) -> None:
@@ -199,16 +192,11 @@ def _place_on_plan(diagram: Diagram, root: Context) -> None:
         smoother = diagram.GetSubsystemByName("smoother")
         smoother.ExecuteInitializationEvents(smoother.GetMyMutableContextFromRoot(root))
     plan_state = diagram.GetSubsystemByName("plan_state")
-    state = plan_state.GetOutputPort("state").Eval(
-        plan_state.GetMyContextFromRoot(root)
-    )
-    plant = _plant(diagram)
-    robot = diagram.GetSubsystemByName("robot_state").robot
-    plant.SetPositionsAndVelocities(
-        plant.GetMyMutableContextFromRoot(root),
-        plant.GetModelInstanceByName(robot.name),
-        state,
-    )
+    context = plan_state.GetMyContextFromRoot(root)
+    state = plan_state.GetOutputPort("state").Eval(context)
+    _, plant, instance = FindRobot(diagram)
+    context = plant.GetMyMutableContextFromRoot(root)
+    plant.SetPositionsAndVelocities(context, instance, state)
 
 
 def _locomotions(diagram: Diagram) -> Iterator[Diagram]:
@@ -220,5 +208,5 @@ def _locomotions(diagram: Diagram) -> Iterator[Diagram]:
             yield from _locomotions(system)
 
 
-def _plant(diagram: Diagram) -> MultibodyPlant:
-    return diagram.GetSubsystemByName("plant")
+def _is_continuous(diagram: Diagram) -> bool:
+    return diagram.GetSubsystemByName("plant").time_step() == 0
