@@ -11,15 +11,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.tree import ModelInstanceIndex
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import quat_multiply, quat_rotate
 
 from .quadruped import Quadruped
-
-Array = NDArray[np.float64]
 
 _FOLD_SAMPLES = 1000
 _MAX_ITERATIONS = 100

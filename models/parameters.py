@@ -4,18 +4,16 @@ from functools import lru_cache
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, RigidBody, SpatialInertia
 from pydrake.systems.framework import Context
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 
 from .plant import PlantConfig
 from .robots import Robot, get_robot
-
-Array = NDArray[np.float64]
 
 LEAST_PAYLOAD = -3.0  # kg; bounds hold down to this payload
 

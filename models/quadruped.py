@@ -4,11 +4,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.tree import ModelInstanceIndex
 
-Array = NDArray[np.float64]
+from loco_drake.common.arrays import Array
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

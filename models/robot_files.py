@@ -16,9 +16,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RollPitchYaw, RotationMatrix
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.common.typed_yaml import read_yaml
 
@@ -27,8 +27,6 @@ from .legs import LEGS
 from .quadruped import Quadruped
 from .robots import ROBOTS, get_robot
 from .urdf import UrdfLegs, find_urdf, read_legs
-
-Array = NDArray[np.float64]
 
 SUFFIXES = (".yaml", ".yml")
 

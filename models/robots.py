@@ -6,7 +6,6 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.common.yaml import yaml_load
 from pydrake.geometry import SceneGraph, Sphere
 from pydrake.multibody.parsing import Parser
@@ -14,13 +13,12 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import Context, DiagramBuilder
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import check_choice
 
 from .legs import LEGS
 from .meshes import convert_meshes
 from .quadruped import Quadruped
-
-Array = NDArray[np.float64]
 
 ROBOTS = ("go2", "a1")
 LEG_JOINTS = ("hip", "thigh", "calf")

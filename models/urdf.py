@@ -7,18 +7,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, RevoluteJoint
 from pydrake.systems.framework import Context
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, check_choice
 
 from .legs import LEGS
 from .meshes import vendor_folder
-
-Array = NDArray[np.float64]
 
 _MAX_BYTES = 20_000_000
 _MAX_LENGTH = 1e5  # in the unit of the file; whether it is m is asked later

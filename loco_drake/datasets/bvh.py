@@ -6,15 +6,22 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.datasets.recording import (
     LARGEST,
-    Array,
     parse_numbers,
     refuse_decimal_commas,
 )
 
 END_SITE = "End Site"
+
+# A node up to those that hang on it, or the end of one.
+_NODE = re.compile(
+    r"(ROOT|JOINT|END) ([^{]+) { OFFSET (\S+) (\S+) (\S+)"
+    r"(?: CHANNELS (\d+)((?: [XYZ](?:position|rotation))*))? |(}) ",
+    re.IGNORECASE,
+)
 
 
 @dataclass(frozen=True)
@@ -106,7 +113,7 @@ def parse_bvh(lines: list[str]) -> Bvh:
         raise InputError("it lacks HIERARCHY, or MOTION with its frames.")
     (head,) = heads
     try:
-        joints = _parse_hierarchy("\n".join(lines[1:head]).split())
+        joints = _parse_hierarchy("\n".join(lines[1:head]))
     except (ValueError, IndexError):
         raise InputError("its HIERARCHY is damaged.") from None
     refuse_decimal_commas(lines[head + 3])
@@ -161,53 +168,37 @@ def _header_value(line: str, name: str) -> float:
     return value
 
 
-def _parse_hierarchy(words: list[str]) -> list[Joint]:
+def _parse_hierarchy(text: str) -> list[Joint]:
     """Returns the joints; raises ValueError or IndexError if the text is damaged."""
+    text = " ".join(text.split()) + " "
+    if _NODE.sub("", text):
+        raise ValueError("words")
     joints: list[Joint] = []
     open_joints: list[int] = []
     columns = 0
-    k = 0
-    while k < len(words):
-        if words[k] == "}":
+    for kind, name, x, y, z, count, words, end in _NODE.findall(text):
+        if end:
             open_joints.pop()
-            k += 1
             continue
-        brace = words.index("{", k)
-        kind, name = words[k].upper(), " ".join(words[k + 1 : brace])
-        root = kind == "ROOT"
-        if kind not in ("ROOT", "JOINT", "END") or words[brace + 1].upper() != "OFFSET":
-            raise ValueError(kind)
-        if root != (not open_joints) or (root and joints) or not name:
-            raise ValueError(kind)
-        x, y, z = (float(word) for word in words[brace + 2 : brace + 5])
-        if not all(abs(value) < LARGEST for value in (x, y, z)):
+        offset = float(x), float(y), float(z)
+        channels = tuple(word.capitalize() for word in words.split())
+        is_root, is_end = kind.upper() == "ROOT", kind.upper() == "END"
+        if not (
+            is_root == (not joints)
+            and (is_root or open_joints)
+            and is_end == (not count)
+            and len(channels) == len(set(channels)) == int(count or 0)
+            and all(abs(value) < LARGEST for value in offset)
+        ):
             raise ValueError(name)
-        channels: tuple[str, ...] = ()
-        k = brace + 5
-        if kind != "END":
-            if words[k].upper() != "CHANNELS":
-                raise ValueError(name)
-            count = int(words[k + 1])
-            channels = tuple(_channel(word) for word in words[k + 2 : k + 2 + count])
-            if len(channels) != count or len(set(channels)) != count:
-                raise ValueError(name)
-            k += 2 + count
         parent = open_joints[-1] if open_joints else -1
-        title = END_SITE if kind == "END" else name
-        joints.append(Joint(title, parent, (x, y, z), channels, columns))
+        title = END_SITE if is_end else name
+        joints.append(Joint(title, parent, offset, channels, columns))
         open_joints.append(len(joints) - 1)
         columns += len(channels)
     if open_joints or not joints:
         raise ValueError("braces")
     return joints
-
-
-def _channel(word: str) -> str:
-    """Returns the usual spelling of a channel's name, such as ``Zrotation``."""
-    name = word[:1].upper() + word[1:].lower()
-    if name[:1] not in set("XYZ") or name[1:] not in ("position", "rotation"):
-        raise ValueError(word)
-    return name
 
 
 def _plain(name: str) -> str:

@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.datasets.recording import (
-    Array,
     Body,
     Recording,
     all_seen,
@@ -74,14 +74,10 @@ def measure(recording: Recording, body: Body) -> Recording:
 
 
 def orient(points: Array, body: Body, notes: dict[str, str]) -> Array:
-    """Returns points (T, 6, 3) with z up and toes in order.
+    """Returns points (T, 6, 3) in m with z up and toes in order, and notes corrections.
 
-    Readers may call it themselves; correct points do not change.
-
-    Args:
-        points: withers, hip, toes FL, FR, RL, RR in m; NaN where one is missing.
-        body: bounds of its size.
-        notes: receives the corrections.
+    Readers may call it themselves; correct points do not change. Frames in which a
+    point is missing (NaN) are not judged.
 
     Raises:
         InputError: if the up axis is unclear, the size is implausible, or there are too
@@ -177,8 +173,8 @@ def _trunk_length(points: Array) -> float:
 
 def _height(points: Array) -> float:
     """Returns the height in m of the trunk's middle when the animal is on its feet."""
-    ground = np.median(np.percentile(points[:, 2:, 2], STANCE_PERCENTILE, axis=0))
-    return float(np.percentile(points[:, :2, 2].mean(axis=1), 75) - ground)
+    trunk = np.percentile(points[:, :2, 2].mean(axis=1), 75)
+    return float(trunk - np.median(_stance_heights(points)))
 
 
 def _size(points: Array) -> float:
@@ -186,12 +182,17 @@ def _size(points: Array) -> float:
     return max(_trunk_length(points), _height(points))
 
 
+def _stance_heights(points: Array) -> Array:
+    """Returns the heights in m of the toes in stance, shape (4,)."""
+    return np.percentile(points[:, 2:, 2], STANCE_PERCENTILE, axis=0)
+
+
 def ground_height(points: Array) -> float:
     """Returns the height of the ground in m; 0 if it is within marker accuracy.
 
     Uses the lower pair of toes, since the markers of a pair may sit high on the toes.
     """
-    stance = np.percentile(points[:, 2:, 2], STANCE_PERCENTILE, axis=0)
+    stance = _stance_heights(points)
     ground = float(min(stance[:2].mean(), stance[2:].mean()))
     return ground if abs(ground) > GROUND * _size(points) else 0.0
 
@@ -223,8 +224,7 @@ def _put_on_ground(points: Array, body: Body, notes: dict[str, str]) -> Array:
         points[..., 2] -= ground
         notes["ground"] = f"moved from z = {ground:.3f} m to 0"
     if body.markers:
-        stance = np.percentile(points[:, 2:, 2], STANCE_PERCENTILE, axis=0)
-        points[:, 2:, 2] -= stance
+        points[:, 2:, 2] -= _stance_heights(points)
     return points
 
 

@@ -10,10 +10,10 @@ of a standing dog near y = 0:
 
 from pathlib import Path
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.datasets.bvh import END_SITE, parse_bvh
 from loco_drake.datasets.recording import (
-    Array,
     Body,
     Recording,
     read_lines,

@@ -8,15 +8,13 @@ in 500 rows of 100 or 1000 rows of 200 frames/s; the file does not say which.
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array, Bools
 from loco_drake.common.errors import InputError
 from loco_drake.common.runs import intervals
 from loco_drake.datasets.conventions import orient
-from loco_drake.datasets.recording import Array, Body, Recording, check_told
+from loco_drake.datasets.recording import Body, Recording, check_told
 from loco_drake.datasets.simulated import read_robot
-
-Bools = NDArray[np.bool_]
 
 # Of the front left hip in the trunk's frame, m.
 HALF_SIZE = (0.1505, 0.044)

@@ -10,12 +10,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array, Bools
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import read_text
-
-Array = NDArray[np.float64]
 
 # Plausible rates of cameras and simulators, frames/s.
 RATES = (10.0, 1000.0)
@@ -110,7 +108,7 @@ def check_range(start: int | None, end: int | None, frames: int) -> tuple[int, i
     return first, stop
 
 
-def all_seen(points: Array) -> NDArray[np.bool_]:
+def all_seen(points: Array) -> Bools:
     """Returns in which frames (T,) of ``points`` (T, ...) nothing is missing."""
     flat = points.reshape(len(points), -1)
     return np.asarray(np.isfinite(flat).all(axis=1), dtype=np.bool_)

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, check_choice, one_line
 from loco_drake.common.files import cache_dir
 from loco_drake.datasets import dog, horse, mpc, solo8
 from loco_drake.datasets.conventions import measure
 from loco_drake.datasets.recording import (
-    Array,
     Body,
     Recording,
     check_frames,

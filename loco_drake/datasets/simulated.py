@@ -8,19 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
-from loco_drake.datasets.recording import Array, read_table
+from loco_drake.datasets.recording import read_table
 
 # Rounding of the text and slack of the simulated joints, m.
 RIGID_WITHIN = 0.005
 
 
 def read_robot(
-    path: Path,
-    half_size: tuple[float, float],
-    centre: int,
-    hips: int,
-    feet: int,
+    path: Path, half_size: tuple[float, float], centre: int, hips: int, feet: int
 ) -> Array:
     """Returns the points of a file: withers, hip, feet FL, FR, RL, RR, (T, 6, 3) in m.
 
@@ -41,14 +38,12 @@ def read_robot(
     points = read_table(path, 27).reshape(-1, 9, 3)
     p_hips = points[:, hips : hips + 4]
     x, y = half_size
-    expected = np.array([[x, y], [x, -y], [-x, y], [-x, -y]])
     front, rear = p_hips[:, :2].mean(axis=1), p_hips[:, 2:].mean(axis=1)
     left, right = p_hips[:, ::2].mean(axis=1), p_hips[:, 1::2].mean(axis=1)
-    axes = (front - rear) / (2 * x), (left - right) / (2 * y)
-    rebuilt = points[:, None, centre] + sum(
-        expected[:, k, None] * axis[:, None] for k, axis in enumerate(axes)
-    )
-    lengths = np.stack([np.linalg.norm(axis, axis=-1) for axis in axes], axis=-1)
+    axes = np.stack(((front - rear) / (2 * x), (left - right) / (2 * y)), axis=1)
+    expected = np.array([[x, y], [x, -y], [-x, y], [-x, -y]])
+    rebuilt = points[:, None, centre] + expected @ axes
+    lengths = np.linalg.norm(axes, axis=-1)
     off = np.maximum(
         np.linalg.norm(rebuilt - p_hips, axis=-1).max(axis=-1),
         (np.abs(lengths - 1) * half_size).max(axis=-1),

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.datasets.conventions import ground_height, orient
-from loco_drake.datasets.recording import Array, Body, Recording
+from loco_drake.datasets.recording import Body, Recording
 from loco_drake.datasets.simulated import read_robot
 
 FPS = 50.0

@@ -1,16 +1,14 @@
 """Measures of the animal: when it stands, how high, and on which toes."""
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.ndimage import binary_opening
 
+from loco_drake.common.arrays import Bools
 from loco_drake.common.errors import InputError
 from loco_drake.common.runs import intervals
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.retargeting.correction import smooth
 from loco_drake.retargeting.scaling import ContactConfig, RetargetConfig
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 # Cut-off of the trunk's speed, to which a toe's speed is compared, Hz.
 _TRUNK_SPEED_HZ = 1.0
@@ -30,7 +28,7 @@ LEAST_STANDING = 0.2  # s
 _MOST_RUNS = 5
 
 
-def on_feet(clip: KeypointClip) -> NDArray[np.bool_]:
+def on_feet(clip: KeypointClip) -> Bools:
     """Returns in which frames the animal stands on its feet, shape (T,).
 
     In these, withers and hip are about as high as they are far from their toes, the
@@ -61,7 +59,7 @@ def track_width(clip: KeypointClip) -> float:
     return float((apart * left).sum(axis=-1).mean())
 
 
-def frames_on_feet(clip: KeypointClip, standing: NDArray[np.bool_]) -> str:
+def frames_on_feet(clip: KeypointClip, standing: Bools) -> str:
     """Returns these frames as numbers of the recording, such as "240-420"."""
     first = int(clip.provenance.get("frames", "0").split("-")[0])
     runs = [f"{first + start}-{first + end}" for start, end in intervals(standing)]
@@ -102,20 +100,12 @@ def stance_height(clip: KeypointClip, config: RetargetConfig) -> float:
 
 
 def detect_contacts(clip: KeypointClip, height: float, config: ContactConfig) -> Bools:
-    """Returns which toes are on the ground, by height and speed, with hysteresis.
+    """Returns which toes (T, 4) are on the ground, by height and speed.
 
     A toe lands when it is low *and* slow, and leaves when it is high *or* fast; the
-    thresholds for leaving are wider. Speeds are relative to the trunk's, since a dog's
-    paw rolls faster in a gallop than in a walk. Short contacts and flights are removed
-    as noise.
-
-    Args:
-        clip: the recording, ground at z = 0.
-        height: the animal's stance height in m.
-        config: the thresholds.
-
-    Returns:
-        Contacts, bool, shape (T, 4).
+    thresholds for leaving are wider. Heights are relative to the animal's stance
+    height in m, speeds to the trunk's, since a dog's paw rolls faster in a gallop than
+    in a walk. Short contacts and flights are removed as noise.
     """
     toe_height = clip.toes[..., 2] / height
     toe_speed = np.linalg.norm(np.gradient(clip.toes, 1 / clip.fps, axis=0), axis=-1)
@@ -127,14 +117,12 @@ def detect_contacts(clip: KeypointClip, height: float, config: ContactConfig) ->
     leave_speed = np.maximum(config.leave_speed, config.leave_speed_ratio * trunk_speed)
     lands = (toe_height < config.land_height) & (toe_speed < land_speed)
     leaves = (toe_height > config.leave_height) | (toe_speed > leave_speed)
-
-    contacts = np.zeros(lands.shape, dtype=bool)
-    for leg in range(4):
-        raw = _hysteresis(lands[:, leg], leaves[:, leg])
-        filled = ~_without_short(~raw, round(config.shortest_swing * clip.fps))
-        shortest = round(config.shortest_stance * clip.fps)
-        contacts[:, leg] = _without_short(filled, shortest)
-    return contacts
+    # The last event decides; before the first one the toe is in the air.
+    frames = np.arange(1, len(lands) + 1)[:, None]
+    last = np.maximum.accumulate(np.where(lands | leaves, frames, 0))
+    down = np.take_along_axis(np.pad(lands & ~leaves, ((1, 0), (0, 0))), last, axis=0)
+    filled = ~_without_short(~down, round(config.shortest_swing * clip.fps))
+    return _without_short(filled, round(config.shortest_stance * clip.fps))
 
 
 def resample_contacts(
@@ -146,23 +134,12 @@ def resample_contacts(
     return resampled
 
 
-def _hysteresis(on: Bools, off: Bools) -> Bools:
-    """Returns a state that turns on with ``on`` and stays so until ``off``."""
-    state = np.zeros(on.shape, dtype=bool)
-    current = False
-    for k in range(len(on)):
-        current = (current or bool(on[k])) and not off[k]
-        state[k] = current
-    return state
-
-
 def _without_short(flags: Bools, shortest: int) -> Bools:
-    """Returns ``flags`` without runs of less than ``shortest`` frames.
+    """Returns flags (T, N) without runs of less than ``shortest`` frames.
 
     Runs that the ends of the clip cut stay: their true length is not known.
     """
-    flags = flags.copy()
-    for start, end in list(intervals(flags)):
-        if end - start < shortest and start > 0 and end < len(flags):
-            flags[start:end] = False
-    return flags
+    size = max(shortest, 1)
+    padded = np.pad(flags, ((size, size), (0, 0)), constant_values=True)
+    kept: Bools = binary_opening(padded, np.ones((size, 1)))[size:-size]
+    return kept

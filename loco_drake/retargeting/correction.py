@@ -19,19 +19,16 @@ The trunk is raised where legs would fold too much or kneel.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.sparse import csc_matrix, csr_matrix, diags_array, eye_array
 from scipy.sparse.linalg import splu, spsolve
 
+from loco_drake.common.arrays import Array, Bools
 from loco_drake.common.rotations import quat_rotate
 from loco_drake.common.runs import intervals
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion.motion import FPS
 from loco_drake.retargeting.scaling import RetargetConfig, Targets
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 _ORDER = 3  # of the differences that are small
 
@@ -55,7 +52,7 @@ _CLOSE_ENOUGH = 0.002
 
 def correct(
     formula: Targets,
-    contacts: NDArray[np.bool_],
+    contacts: Bools,
     robot: Quadruped,
     config: RetargetConfig,
 ) -> Targets:

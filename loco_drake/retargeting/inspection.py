@@ -4,16 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array, Bools
 from loco_drake.common.runs import intervals
 from loco_drake.models.legs import LEGS
 from loco_drake.motion.gait_timing import clip_track, gait_timing
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.retargeting.contacts import detect_contacts, stance_height
 from loco_drake.retargeting.scaling import load_config
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -33,7 +31,7 @@ class ClipSummary:
     phase: tuple[float, ...] | None
 
 
-def summarize(clip: KeypointClip) -> tuple[ClipSummary, NDArray[np.bool_]]:
+def summarize(clip: KeypointClip) -> tuple[ClipSummary, Bools]:
     """Returns the summary of a clip and its contacts, shape (T, 4).
 
     Raises:
@@ -64,7 +62,7 @@ def trunk_speed(clip: KeypointClip) -> Array:
     return speed
 
 
-def clip_figure(clip: KeypointClip, contacts: NDArray[np.bool_], title: str) -> Figure:
+def clip_figure(clip: KeypointClip, contacts: Bools, title: str) -> Figure:
     """Returns a figure of toe heights, gait diagram and speeds over time."""
     figure = Figure(figsize=(12, 8), layout="constrained")
     heights, gait, speed = figure.subplots(3, 1, sharex=True)

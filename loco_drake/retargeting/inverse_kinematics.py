@@ -3,15 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.multibody.inverse_kinematics import InverseKinematics
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.solvers import SnoptSolver, SolverOptions
 
+from loco_drake.common.arrays import Array, Bools
 from loco_drake.models.quadruped import Quadruped
-
-Array = NDArray[np.float64]
 
 # Toes are placed within a box of this half width, m.
 TOLERANCE = 1e-5
@@ -24,7 +22,7 @@ class Solution(NamedTuple):
     """Joints of T frames."""
 
     joints: Array  # rad, shape (T, J)
-    solved: NDArray[np.bool_]  # in which frames the solver succeeded, shape (T,)
+    solved: Bools  # in which frames the solver succeeded, shape (T,)
 
 
 class LegSolver:

@@ -35,9 +35,9 @@ from math import isfinite, sqrt
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import (
     quat_conjugate,
@@ -49,8 +49,6 @@ from loco_drake.common.typed_yaml import read_yaml
 from loco_drake.datasets.registry import get_dataset
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion.keypoints import KeypointClip
-
-Array = NDArray[np.float64]
 
 _SOURCES = Path(__file__).parent / "sources"
 

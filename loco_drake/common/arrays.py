@@ -1,0 +1,7 @@
+"""Types of arrays, of any shape."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
