@@ -73,8 +73,7 @@ def check_rate(fps: float) -> float:
 def check_told(told: float, fps: float | None) -> float:
     """Returns the rate inferred from the motion, or the given one if it agrees.
 
-    Raises:
-        InputError: if they differ by more than a third.
+    Raises InputError if they differ by more than a third.
     """
     if fps is not None and not 0.75 < fps / told < 4 / 3:
         raise InputError(
@@ -93,10 +92,8 @@ def check_frames(frames: Sized) -> None:
 def check_range(start: int | None, end: int | None, frames: int) -> tuple[int, int]:
     """Returns ``(start, end)`` of a stretch, ``end`` exclusive.
 
-    None stands for the first frame, or for the frame after the last.
-
-    Raises:
-        InputError: if the stretch does not lie within ``frames`` frames.
+    None stands for the first frame, or for the frame after the last. Raises InputError
+    if the stretch does not lie within ``frames`` frames.
     """
     first = 0 if start is None else start
     stop = frames if end is None else end
@@ -141,10 +138,8 @@ def read_table(path: Path, columns: int) -> Array:
 def read_named_table(path: Path, names: Sequence[str]) -> Array:
     """Returns columns of a table with a header, shape (rows, ``len(names)``).
 
-    Args:
-        path: the file. A field that is empty or ``NaN`` is a gap, and NaN.
-        names: of the columns to return, in this order; quotes around them, upper and
-            lower case, and a ``#`` after them do not matter.
+    They are in the order of ``names``; quotes around these in the file, upper and lower
+    case, and a ``#`` after them do not matter. A field that is empty or ``NaN`` is NaN.
 
     Raises:
         InputError: if the file cannot be read, a column or all rows are lacking, a line
@@ -168,11 +163,7 @@ def parse_numbers(
 ) -> Array:
     """Returns the numbers of comma-separated lines, shape (lines, ``columns``).
 
-    Args:
-        lines: some of the file's, at least one.
-        first: number of the first of them in the file, for messages.
-        columns: how many numbers each must hold.
-        gaps: whether NaN is allowed.
+    ``first`` is the number of the first line in its file; ``gaps`` allows NaN.
 
     Raises:
         InputError: if a line has another number of columns, something other than a
@@ -188,13 +179,9 @@ def parse_numbers(
             )
     values = _parse(lines)
     if values is None:
-        number = next(
-            n for n, line in enumerate(lines, first) if _parse([line]) is None
-        )
-        raise InputError(f"line {number} holds something that is not a number.")
-    wrong = ~(np.abs(values) <= LARGEST)
-    if gaps:
-        wrong &= ~np.isnan(values)
+        unread = (n for n, line in enumerate(lines, first) if _parse([line]) is None)
+        raise InputError(f"line {next(unread)} holds something that is not a number.")
+    wrong = ~(np.abs(values) <= LARGEST) & ~(gaps & np.isnan(values))
     if wrong.any():
         row, column = np.argwhere(wrong)[0]
         value = values[row, column]

@@ -110,21 +110,20 @@ def read_rows(table: Path) -> list[Row]:
 def _numbered_rows(table: Path) -> Iterator[tuple[int, Row]]:
     """Yields number of the line and cells of each row that is not blank."""
     text = read_text(table)
-    header = text.partition("\n")[0]
-    reader = csv.DictReader(
-        io.StringIO(text, newline=""), delimiter=";" if "," not in header else ","
-    )
+    separator = "," if "," in text.partition("\n")[0] else ";"
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
     try:
-        names = [name.strip().lower() for name in reader.fieldnames or ()]
-        if lacking := [name for name in COLUMNS if name not in names]:
-            raise InputError(f"{table}: line 1 lacks {', '.join(lacking)}.")
+        names = [name.strip().lower() for name in next(reader, [])]
+        if missing := [name for name in COLUMNS if name not in names]:
+            raise InputError(f"{table}: line 1 lacks {', '.join(missing)}.")
         for cells in reader:
             line = reader.line_num
-            if None in cells:
+            if len(cells) > len(names):
                 raise InputError(
                     f"{table}: line {line} has more cells than the header."
                 )
-            row = {k.strip().lower(): (v or "").strip() for k, v in cells.items()}
+            row = dict.fromkeys(names, "")
+            row |= zip(names, map(str.strip, cells), strict=False)
             if any(row.values()):
                 if missing := [name for name in COLUMNS if not row[name]]:
                     raise InputError(
