@@ -34,12 +34,9 @@ Kd .53 .55 .58
 
 
 def AddGround(plant: MultibodyPlant, *, friction: float, visual: bool) -> None:
-    """Adds ground at z = 0 to a plant that is not finalized.
+    """Adds ground at z = 0 to a plant with a scene graph that is not finalized.
 
-    Args:
-        plant: registered with a scene graph.
-        friction: Coulomb coefficient, static and dynamic.
-        visual: whether to add a visible floor.
+    ``friction`` is Coulomb's coefficient, static and dynamic; ``visual`` adds a floor.
     """
     properties = ProximityProperties()
     AddContactMaterial(
@@ -71,15 +68,10 @@ def SetGround(
     friction: float | None = None,
     stiffness: float | None = None,
 ) -> None:
-    """Sets ground parameters in a Context; None leaves a parameter unchanged.
+    """Sets parameters of :func:`AddGround` in the scene graph's Context, unless None.
 
-    Args:
-        plant: contains a ground from :func:`AddGround`.
-        scene_graph: the plant's scene graph.
-        context: the scene graph's.
-        friction: Coulomb coefficient, static and dynamic.
-        stiffness: N/m; a contact has k_foot k / (k_foot + k). The ground's damping is
-            set to the feet's, so that the damping of a contact does not change.
+    With a stiffness k in N/m a contact has k_foot k / (k_foot + k); the ground's
+    damping is set to the feet's, so that the damping of a contact does not change.
     """
     inspector = scene_graph.get_query_output_port().Eval(context).inspector()
     # Users may have added their own shapes to the world.
@@ -94,11 +86,10 @@ def SetGround(
             "material", "coulomb_friction", CoulombFriction(friction, friction)
         )
     if stiffness is not None:
-        for name, value in (
-            ("point_contact_stiffness", stiffness),
-            ("hunt_crossley_dissipation", _FOOT_DISSIPATION),
-        ):
-            properties.UpdateProperty("material", name, value)
+        properties.UpdateProperty("material", "point_contact_stiffness", stiffness)
+        properties.UpdateProperty(
+            "material", "hunt_crossley_dissipation", _FOOT_DISSIPATION
+        )
     source = plant.get_source_id()
     scene_graph.AssignRole(context, source, ground, properties, RoleAssign.kReplace)
 

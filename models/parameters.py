@@ -21,22 +21,12 @@ _POSES, _REFINED = 1000, 4
 
 
 def SetTrunkLoad(
-    trunk: RigidBody,
-    context: Context,
-    *,
-    mass: float,
-    p_shift_B: Array,
+    trunk: RigidBody, context: Context, *, mass: float, p_shift_B: Array
 ) -> None:
-    """Sets mass and centre of mass of the trunk relative to the model.
+    """Adds mass in kg to the trunk, and shifts its centre of mass, m, shape (3,).
 
     The rotational inertia about the centre of mass scales with the mass, as for a
-    denser trunk.
-
-    Args:
-        trunk: of a robot from :func:`.robots.AddRobotModel`.
-        context: the plant's.
-        mass: added mass, kg; may be negative.
-        p_shift_B: shift of the centre of mass in B, m, shape (3,).
+    denser trunk. The mass may be negative. ``context`` is the plant's.
     """
     M_BBo = trunk.default_spatial_inertia()
     own = M_BBo.get_mass()
@@ -58,13 +48,9 @@ def SetReflectedInertia(
     context: Context,
     inertia: Array,
 ) -> None:
-    """Sets the inertia of the rotors at the joints.
+    """Sets the inertia of the rotors at the joints of Go2 or A1.
 
-    Args:
-        plant: contains a robot from :func:`.robots.AddRobotModel`.
-        instance: the robot's.
-        context: the plant's.
-        inertia: by actuator, kg m^2, shape (12,); may be negative within bounds.
+    It is by actuator, kg m^2, shape (12,), and may be negative within bounds.
 
     Raises:
         InputError: if the mass matrix would not be positive definite in every pose.
@@ -100,12 +86,8 @@ def removable_inertia(robot: Robot) -> float:
     robot.AddModel(Parser(plant))
     plant.Finalize()
     context = plant.CreateDefaultContext()
-    SetTrunkLoad(
-        plant.GetBodyByName(robot.trunk_frame),
-        context,
-        mass=LEAST_PAYLOAD,
-        p_shift_B=np.zeros(3),
-    )
+    trunk = plant.GetBodyByName(robot.trunk_frame)
+    SetTrunkLoad(trunk, context, mass=LEAST_PAYLOAD, p_shift_B=np.zeros(3))
 
     def least(joints: Array) -> float:
         plant.SetPositions(context, [1.0, *[0.0] * 6, *joints])

@@ -65,12 +65,8 @@ def AddRobotPlant(
     the 12 joints, in rad and rad/s. The joints are limp while it is not connected. v_d
     must be 0, since CENIC of Drake 1.51 applies it with the wrong sign.
 
-    Args:
-        builder: the builder.
-        robot: from :func:`loco_drake.models.robots.get_robot`.
-        config: contact, time step and friction. With "cenic" also call
-            :func:`ConfigureSimulator`.
-        pre_finalize: called before finalization; may add to the plant.
+    With the contact "cenic" also call :func:`ConfigureSimulator`. ``pre_finalize`` may
+    add to the plant.
 
     Returns:
         The plant, the scene graph and the robot's model instance.

@@ -2,12 +2,12 @@
 
 import re
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
 from pydrake.common.yaml import yaml_load
-from pydrake.geometry import SceneGraph, Sphere
+from pydrake.geometry import Box, SceneGraphInspector, Shape, Sphere
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
@@ -158,10 +158,8 @@ class Robot(Quadruped):
 def ConfigureParser(parser: Parser, *, visual: bool = True) -> None:
     """Registers the packages in the models' URLs with ``parser``.
 
-    Args:
-        parser: the parser.
-        visual: whether to register the meshes; the first time this takes some seconds,
-            see :mod:`loco_drake.models.meshes`.
+    Those of the meshes are included if ``visual``; the first time this takes some
+    seconds, see :mod:`loco_drake.models.meshes`.
     """
     parser.package_map().AddPackageXml(str(_MODELS / "package.xml"))
     if visual:
@@ -169,12 +167,9 @@ def ConfigureParser(parser: Parser, *, visual: bool = True) -> None:
 
 
 def AddRobotModel(parser: Parser, name: str, *, visual: bool) -> ModelInstanceIndex:
-    """Adds a robot to the parser's plant.
+    """Adds one of :data:`ROBOTS` to the parser's plant, which is not finalized.
 
-    Args:
-        parser: parser of a plant that is not finalized.
-        name: one of :data:`ROBOTS`.
-        visual: whether to load meshes. Without them parsing is five times as fast.
+    Meshes are loaded if ``visual``. Without them parsing is five times as fast.
 
     Raises:
         InputError: if there is no such robot.
@@ -215,7 +210,8 @@ def get_robot(name: str) -> Robot:
     p_BHip, p_BThigh, p_BCalf, p_BF = (
         _origins(plant, context, part) for part in (*LEG_JOINTS, "foot")
     )
-    foot_radius = _foot_radius(plant, scene_graph)
+    shape_of = partial(_collision_shape, plant, scene_graph.model_inspector())
+    (foot_radius,) = {shape_of(f"{leg}_calf", Sphere).radius() for leg in LEGS}
 
     stand_joints = np.array(extras["stand_joints"], dtype=np.float64)
     plant.SetPositions(context, [1.0, *[0.0] * 6, *stand_joints])
@@ -243,7 +239,7 @@ def get_robot(name: str) -> Robot:
         thigh_length=float(p_BThigh[0, 2] - p_BCalf[0, 2]),
         calf_length=float(p_BCalf[0, 2] - p_BF[0, 2]),
         foot_radius=foot_radius,
-        trunk_size=_trunk_size(plant, scene_graph),
+        trunk_size=np.array(shape_of("base", Box, centred=True).size()),
         stand_joints=stand_joints,
         stand_height=float(foot_radius - lowest),
         trunk_frame="base",
@@ -263,27 +259,19 @@ def _origins(plant: MultibodyPlant, context: Context, part: str) -> Array:
     return np.array([frame.CalcPose(context, base).translation() for frame in frames])
 
 
-def _foot_radius(plant: MultibodyPlant, scene_graph: SceneGraph) -> float:
-    """Returns the radius of the toe spheres, which must be equal."""
-    inspector = scene_graph.model_inspector()
-    radii = set()
-    for leg in LEGS:
-        body = plant.GetBodyByName(f"{leg}_calf")
-        (geometry,) = plant.GetCollisionGeometriesForBody(body)
-        shape = inspector.GetShape(geometry)
-        assert isinstance(shape, Sphere)
-        radii.add(shape.radius())
-    (radius,) = radii
-    return float(radius)
-
-
-def _trunk_size(plant: MultibodyPlant, scene_graph: SceneGraph) -> Array:
-    """Returns the size of the only box on the trunk, which must be centred at B."""
-    inspector = scene_graph.model_inspector()
-    body = plant.GetBodyByName("base")
-    (geometry,) = plant.GetCollisionGeometriesForBody(body)
-    assert inspector.GetPoseInFrame(geometry).IsExactlyIdentity()
-    return np.array(inspector.GetShape(geometry).size())
+def _collision_shape(
+    plant: MultibodyPlant,
+    inspector: SceneGraphInspector,
+    body: str,
+    kind: type[Shape],
+    centred: bool = False,
+) -> Shape:
+    """Returns the only collision shape of a body, which must be of that kind."""
+    (geometry,) = plant.GetCollisionGeometriesForBody(plant.GetBodyByName(body))
+    shape = inspector.GetShape(geometry)
+    assert isinstance(shape, kind)
+    assert not centred or inspector.GetPoseInFrame(geometry).IsExactlyIdentity()
+    return shape
 
 
 def _angles(joints: Array) -> tuple[Array, Array, Array]:

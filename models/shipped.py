@@ -27,10 +27,8 @@ def policy_variants(robot: Robot) -> dict[str, Path]:
 def policy_path(robot: Robot, policy: Path | None = None) -> Path:
     """Returns the weights file of a policy.
 
-    Args:
-        robot: the robot.
-        policy: a weights file, which is returned as it is, or the name of a shipped
-            variant, such as "randomized"; the robot's main policy if None.
+    ``policy`` is a weights file, which is returned as it is, or the name of a shipped
+    variant, such as "randomized"; by default it is the robot's main policy.
 
     Raises:
         InputError: if there is no such policy; names the existing ones.

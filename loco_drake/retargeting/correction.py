@@ -1,7 +1,8 @@
 """Correction of the formula's targets so that a robot can follow them.
 
-Toes stand still in stance and swing above the ground, trunk and toes move smoothly, and
-the trunk is high enough for legs to fold and knees to clear the ground.
+Toes stand still in stance, swing above the ground and are within reach, trunk and toes
+move smoothly, and the trunk is high enough for legs to fold and knees to clear the
+ground.
 
 *Toes.* For each leg, the result is the trajectory nearest to the formula's with small
 third differences and a fixed position in each contact. Footholds and swings are
@@ -56,12 +57,7 @@ def correct(
     robot: Quadruped,
     config: RetargetConfig,
 ) -> Targets:
-    """Returns targets at 50 Hz that a robot can follow, near to the formula's.
-
-    Trunk and toes move smoothly, toes in contact stand still on the ground, swing toes
-    stay above it, all toes are within reach, and the trunk is high enough for legs to
-    fold and knees to clear the ground.
-    """
+    """Returns targets at 50 Hz that a robot can follow, near to the formula's."""
     smoothing = config.smoothing
     targets = Targets(
         p_WB=smooth(formula.p_WB, smoothing.base, FPS),
@@ -125,12 +121,8 @@ def plant_feet(
 ) -> Array:
     """Returns toes (T, 4, 3) that stand still in contact and swing above the ground.
 
-    Args:
-        p_WF: the formula's targets in m, shape (T, 4, 3).
-        contacts: whether each toe is on the ground, shape (T, 4).
-        foot_radius: of the toe sphere in m.
-        cutoff: of the smoothing, Hz.
-        fps: frames per second.
+    ``p_WF`` are the formula's targets in m, ``contacts`` (T, 4) say which toes are on
+    the ground, and ``cutoff`` is that of the smoothing in Hz.
     """
     weight = penalty(cutoff, fps)
     D = difference_matrix(len(p_WF))
@@ -219,12 +211,9 @@ def raise_trunk(targets: Targets, robot: Quadruped, fps: float) -> Targets:
 def _hip_and_knee_heights(targets: Targets, robot: Quadruped) -> tuple[Array, Array]:
     """Returns the heights in m of the lowest hip and the lowest knee, each (T,)."""
     p_BKnee = robot.knee_positions(robot.nearest_joints(targets.p_BF))
-    q_WB, height = targets.q_WB[:, None], targets.p_WB[:, 2]
-    p_BHip = np.broadcast_to(robot.p_BHip, p_BKnee.shape)
-    hips, knees = (
-        height + quat_rotate(q_WB, points)[..., 2].min(axis=1)
-        for points in (p_BHip, p_BKnee)
-    )
+    p_BPoints = np.stack((np.broadcast_to(robot.p_BHip, p_BKnee.shape), p_BKnee))
+    lowest = quat_rotate(targets.q_WB[:, None], p_BPoints)[..., 2].min(axis=-1)
+    hips, knees = targets.p_WB[:, 2] + lowest
     return hips, knees
 
 

@@ -88,12 +88,8 @@ def retarget_clip(
 ) -> tuple[Motion, RetargetReport]:
     """Returns ``clip`` as a motion of ``robot`` at 50 Hz, and a report on its quality.
 
-    Args:
-        clip: at any rate.
-        robot: to move.
-        config: of the clip's source; the shipped one if None.
-        solver: of this robot, to be used again for many clips.
-        variant: the clip mirrored, or in time for the animal's Froude number.
+    ``config`` is that of the clip's source by default; a ``solver`` of the robot can be
+    used again for many clips.
 
     Raises:
         InputError: if the clip is too short or not of an animal on its feet.
@@ -168,10 +164,7 @@ class Outcome:
 class SegmentRetargeter:
     """Retargets segments one by one with one solver.
 
-    Args:
-        robot: to move.
-        split: gives the side that goes into the provenance; None leaves it out.
-        variant: what to change of the recordings.
+    The provenance says on which side of ``split`` they are, unless it is None.
     """
 
     def __init__(
@@ -218,16 +211,9 @@ def retarget_segments(
 ) -> Iterator[Outcome]:
     """Retargets segments, and writes ``out_dir/SEGMENT.npz`` for each.
 
-    A recording that cannot be read or retargeted is reported in its outcome and does
-    not stop the others. A process has only one clip at a time in memory.
-
-    Args:
-        segments: from :func:`loco_drake.datasets.segments.read_segments`.
-        robot: to move.
-        out_dir: made if need be; files of the same name are replaced.
-        split: gives the side that goes into the provenance; None leaves it out.
-        workers: processes.
-        variant: what to change of the recordings.
+    The folder is made if need be, and files of the same name are replaced. A recording
+    that cannot be read or retargeted is reported in its outcome and does not stop the
+    others. Each of the worker processes has only one clip at a time in memory.
 
     Yields:
         One outcome for each segment, in their order, as soon as it is done.

@@ -38,7 +38,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from loco_drake.common.arrays import Array
-from loco_drake.common.errors import InputError
+from loco_drake.common.errors import InputError, check_bounds
 from loco_drake.common.rotations import (
     quat_conjugate,
     quat_multiply,
@@ -134,8 +134,7 @@ def read_config(path: Path) -> RetargetConfig:
         **{f"contact.{key}": value for key, value in vars(config.contact).items()},
     }
     for name, value in above_0.items():
-        if not 0 < value < float("inf"):
-            raise InputError(f"{path}: {name} must be above 0, not {value}.")
+        check_bounds(f"{path}: {name}", value, 0, above=True)
     for name in ("front_hip", "rear_hip", "hip_spread", "base_height_offset"):
         if not isfinite(value := getattr(config, name)):
             raise InputError(f"{path}: {name} must be finite, not {value}.")
@@ -191,18 +190,14 @@ def scale_to_robot(
 ) -> Targets:
     """Returns the targets by the formula above, one frame for each of the clip's.
 
-    Args:
-        clip: ground at z = 0.
-        height: the animal's stance height H in m.
-        robot: the robot.
-        config: configuration of the clip's source.
+    ``height`` is the animal's stance height H in m.
     """
     alpha = robot.stand_height / height
     trunk = clip.withers - clip.hip
     yaw = np.unwrap(np.arctan2(trunk[:, 1], trunk[:, 0]))
     pitch = -np.arctan2(trunk[:, 2], np.hypot(trunk[:, 0], trunk[:, 1]))
     p_WB = alpha * (clip.withers + clip.hip) / 2
-    p_WB = p_WB + np.array([0.0, 0.0, config.base_height_offset])
+    p_WB[:, 2] += config.base_height_offset
     base = Targets(p_WB=p_WB, yaw=yaw, pitch=pitch, p_WF=np.empty((0, 4, 3)))
 
     d = (trunk / np.linalg.norm(trunk, axis=-1, keepdims=True)) * height
@@ -234,8 +229,7 @@ class Variant:
     def time_scale(self, scale: float) -> float:
         """Returns the duration of the motion over that of the recording.
 
-        Args:
-            scale: the robot's stance height over the animal's.
+        ``scale`` is the robot's stance height over the animal's.
         """
         return sqrt(scale) if self.froude else 1.0
 

@@ -89,13 +89,8 @@ def choose_windows(
     No two overlap in a recording. Every stretch first offers the window in its middle;
     if these are fewer than ``count``, stretches offer two, three, ... side by side. Two
     fifths are from the validation set if available, the others from the training set,
-    with subjects in turn. If one set has too few, the other fills up.
-
-    Args:
-        stretches: of any labels; those that are not among the fifteen are passed over.
-        count: for each label.
-        seed: which subjects come first.
-        seconds: of a window.
+    with subjects in turn; ``seed`` decides which come first. If one set has too few,
+    the other fills up. Windows last ``seconds``.
     """
     size = _frames(seconds, FPS)
     by_label: dict[GaitLabel, list[Stretch]] = {}
