@@ -23,8 +23,7 @@ from pydrake.systems.framework import (
 )
 
 from loco_drake.common.errors import InputError
-from loco_drake.control.domain import MAX_LATENCY, Domain
-from loco_drake.control.measurement import draw_error, measure
+from loco_drake.control.domain import MAX_LATENCY, Domain, draw_error, measure
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.state import JOINT_VELOCITIES, JOINTS, split
 from loco_drake.models.ground import SetGround

@@ -8,19 +8,14 @@ from pydrake.common.yaml import yaml_load_typed
 from pydrake.systems.analysis import SimulatorConfig
 from pydrake.visualization import VisualizationConfig
 
-from loco_drake.common.errors import (
-    InputError,
-    check_choice,
-    check_number,
-)
+from loco_drake.common.errors import InputError, check_choice, check_number
 from loco_drake.common.typed_yaml import refuse_repeated_keys
 from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS
 from loco_drake.motion.gaits import parse_schedule
 
-# Limits of a scenario's text: the loader recurses at each bracket and copies at each
-# alias.
+# Of a scenario's text: the loader recurses at each bracket, and copies at each alias.
 _MAX_SIZE = 100_000
 _MAX_BRACKETS = 200
 
@@ -31,17 +26,12 @@ _MAX_BRACKETS = 200
 class GeneratedReference:
     """Motion generated while the simulation runs."""
 
-    # Gait label, such as dog-trot, or a schedule of labels with start times in s, such
-    # as dog-pace,dog-trot@3.
-    gait: str = "dog-trot"
-    # Seed of the tokens.
-    seed: int = 0
+    gait: str = "dog-trot"  # or a schedule such as dog-pace,dog-trot@3
+    seed: int = 0  # of the tokens
     # Intended duration in s, which conditions the generator; the motion has no end.
     duration: float = 10.0
-    # Sampling temperature; 0 is greedy.
-    temperature: float = 1.0
-    # Sample from the likeliest codes that together have this probability.
-    top_p: float = 0.95
+    temperature: float = 1.0  # 0 is greedy
+    top_p: float = 0.95  # probability of the codes to sample from, the likeliest ones
 
     def check(self) -> None:
         """Raises InputError unless every field is valid."""
@@ -112,44 +102,34 @@ class Disturbances:
     They have no effect until SetDomain sets a domain.
     """
 
-    # Simulate latency and strength of the motors.
-    actuation: bool = False
-    # Apply forces to the trunk.
-    pushes: bool = False
-    # Add sensor errors to the state that the policy observes.
-    sensors: bool = False
-
-
-def _visualization() -> VisualizationConfig:
-    return VisualizationConfig(
-        publish_proximity=False, publish_inertia=False, publish_contacts=False
-    )
+    actuation: bool = False  # latency and strength of the motors
+    pushes: bool = False  # forces on the trunk
+    sensors: bool = False  # errors of the state that the policy observes
 
 
 @dataclass(kw_only=True)
 class Scenario:
     """Everything that defines a diagram and its simulator."""
 
-    # Robot: go2 or a1.
-    robot: str = "go2"
-    # Contact solver, time step and friction.
+    robot: str = "go2"  # go2 or a1
     plant: PlantConfig = field(default_factory=PlantConfig)
-    # Source of the motion to track.
     reference: GeneratedReference | MotionReference | PlanReference = field(
         default_factory=GeneratedReference
     )
     # Re-timing of the motion; null to track it as it is.
     smoother: SmootherConfig | None = field(default_factory=SmootherConfig)
-    # Policy that controls the joints.
     policy: TrainedPolicy | ExternalAction | ExternalTargets = field(
         default_factory=TrainedPolicy
     )
-    # Systems that simulate a world unlike the model.
     disturbances: Disturbances = field(default_factory=Disturbances)
     # Only target_realtime_rate; the integrator follows from plant.contact.
     simulator: SimulatorConfig = field(default_factory=SimulatorConfig)
-    # Drake's configuration of Meshcat.
-    visualization: VisualizationConfig = field(default_factory=_visualization)
+    # Of Meshcat.
+    visualization: VisualizationConfig = field(
+        default_factory=lambda: VisualizationConfig(
+            publish_proximity=False, publish_inertia=False, publish_contacts=False
+        )
+    )
 
     def check(self) -> None:
         """Raises InputError unless every field is valid."""
@@ -175,10 +155,7 @@ def LoadScenario(
 ) -> Scenario:
     """Returns the scenario in a YAML file or text, with defaults for missing fields.
 
-    Args:
-        filename: a YAML file.
-        data: YAML text, instead of a file.
-        overlay: YAML text that overrides fields.
+    ``data`` is YAML text instead of a file; ``overlay``, too, overrides fields.
 
     Raises:
         InputError: if a file cannot be read, or a field is unknown, has the wrong type
@@ -212,7 +189,6 @@ def _read(path: Path) -> str:
 
 
 def _overlaid(scenario: Scenario, text: str) -> Scenario:
-    # The loader would recurse for each bracket, and copy for each alias.
     if len(text) > _MAX_SIZE or sum(map(text.count, "[{*")) > _MAX_BRACKETS:
         raise InputError(
             f"A scenario has at most {_MAX_SIZE} characters and {_MAX_BRACKETS} "

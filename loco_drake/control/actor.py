@@ -7,6 +7,7 @@ other.
 """
 
 from dataclasses import asdict, dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -39,15 +40,15 @@ OBSERVATION_CLIP = 5.0  # standard deviations
 # Parts of the observation that need the base's position in the world or its velocity.
 PRIVILEGED = ("v_WB_H", "height", "plan_p_H")
 
-
-_KEEP = (np.arange(1), np.ones(1))
-_POLAR = (np.arange(3), MIRROR_POLAR)
-_AXIAL = (np.arange(3), MIRROR_AXIAL)
-_JOINTS = (MIRROR_JOINTS, MIRROR_JOINT_SIGNS)
-_LEGS = (MIRROR_LEGS, np.ones(4))
+Values = TypeVar("Values", NDArray[np.float64], NDArray[np.float32], Tensor)
 
 # Permutation and signs that mirror a part of the observation; parts may repeat them.
-_PARTS = {
+_KEEP = ([0], [1.0])
+_POLAR = ([0, 1, 2], MIRROR_POLAR)
+_AXIAL = ([0, 1, 2], MIRROR_AXIAL)
+_JOINTS = (MIRROR_JOINTS, MIRROR_JOINT_SIGNS)
+_LEGS = (MIRROR_LEGS, np.ones(4))
+_MIRRORS = {
     "gravity_B": _POLAR,
     "w_WB_B": _AXIAL,
     "v_WB_H": _POLAR,
@@ -66,36 +67,33 @@ _PARTS = {
 }
 
 
-def _observation_mirror() -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    sources, signs, start = [], [], 0
+class _Mirror:
+    """Mirrors arrays and tensors by permuting the last axis and changing signs."""
+
+    def __init__(self, order: NDArray[np.int64], signs: NDArray[np.float64]) -> None:
+        self._order, self._signs = order, signs
+        self._signs_torch = torch.tensor(signs, dtype=torch.float32)
+
+    def __call__(self, values: Values) -> Values:
+        """Returns the mirror image of ``values``, of the same shape (..., N)."""
+        if isinstance(values, Tensor):
+            return values[..., self._order] * self._signs_torch
+        return (values[..., self._order] * self._signs).astype(values.dtype)
+
+
+def _observation_mirror() -> _Mirror:
+    orders, signs, start = [], [], 0
     for name, size in OBSERVATION_LAYOUT:
-        order, sign = _PARTS[name]
+        order, sign = map(np.asarray, _MIRRORS[name])
         for first in range(start, start + size, len(order)):
-            sources.append(first + order)
+            orders.append(first + order)
             signs.append(sign)
         start += size
-    return np.concatenate(sources), np.concatenate(signs)
+    return _Mirror(np.concatenate(orders), np.concatenate(signs))
 
 
-_SOURCES, _SIGNS = _observation_mirror()
-_JOINT_SIGNS_TORCH = torch.tensor(MIRROR_JOINT_SIGNS, dtype=torch.float32)
-_SIGNS_TORCH = torch.tensor(_SIGNS, dtype=torch.float32)
-
-Values = TypeVar("Values", NDArray[np.float64], NDArray[np.float32], Tensor)
-
-
-def mirror_observations(observations: Values) -> Values:
-    """Returns mirrored observations, shape (..., OBSERVATION_SIZE)."""
-    if isinstance(observations, Tensor):
-        return observations[..., _SOURCES] * _SIGNS_TORCH
-    return (observations[..., _SOURCES] * _SIGNS).astype(observations.dtype)
-
-
-def mirror_actions(actions: Values) -> Values:
-    """Returns mirrored actions, shape (..., 12)."""
-    if isinstance(actions, Tensor):
-        return actions[..., MIRROR_JOINTS] * _JOINT_SIGNS_TORCH
-    return (actions[..., MIRROR_JOINTS] * MIRROR_JOINT_SIGNS).astype(actions.dtype)
+mirror_observations = _observation_mirror()  # of shape (..., OBSERVATION_SIZE)
+mirror_actions = _Mirror(MIRROR_JOINTS, MIRROR_JOINT_SIGNS)  # of shape (..., 12)
 
 
 def unprivileged_mask() -> Tensor:
@@ -103,12 +101,8 @@ def unprivileged_mask() -> Tensor:
 
     Multiplying normalized observations by it sets privileged parts to their mean.
     """
-    return torch.cat(
-        [
-            torch.full((size,), float(name not in PRIVILEGED))
-            for name, size in OBSERVATION_LAYOUT
-        ]
-    )
+    masks = ([name not in PRIVILEGED] * size for name, size in OBSERVATION_LAYOUT)
+    return torch.tensor(list(chain(*masks)), dtype=torch.float32)
 
 
 @dataclass(kw_only=True)
@@ -161,22 +155,16 @@ class Actor(nn.Module):
         if not self.config.privileged:
             normal = normal * self.mask
         image = self.layers(mirror_observations(normal))
-        action: Tensor = (self.layers(normal) + mirror_actions(image)) / 2
-        return action
+        return (self.layers(normal) + mirror_actions(image)) / 2
 
 
 def save_actor(actor: Actor, path: Path, *, half: bool = False) -> None:
-    """Writes the policy's weights.
-
-    The normalizer's statistics are always stored in full precision, since they exceed
-    the range of 16 bits.
-    """
-    tensors = dict(actor.state_dict())
-    if half:
-        tensors = {
-            name: value if name in ("mean", "variance") else value.half()
-            for name, value in tensors.items()
-        }
+    """Writes the policy's weights, those of the layers in 16 bits if ``half``."""
+    tensors = {
+        # The normalizer's statistics exceed the range of 16 bits.
+        name: value.half() if half and name not in ("mean", "variance") else value
+        for name, value in actor.state_dict().items()
+    }
     save_weights(path, KIND, tensors, asdict(actor.config))
 
 
@@ -189,17 +177,11 @@ def load_actor(path: Path, robot: Robot) -> Actor:
     """
     tensors, header = load_weights(path, KIND)
     config = read_config(ActorConfig, header, path)
-    expected = ActorConfig(
-        robot=robot.name,
-        labels=config.labels,
-        hidden=config.hidden,
-        privileged=config.privileged,
-    )
+    free = {name: getattr(config, name) for name in ("labels", "hidden", "privileged")}
+    expected = ActorConfig(robot=robot.name, **free)
     for name, value in asdict(expected).items():
-        if getattr(config, name) != value:
+        if (trained := getattr(config, name)) != value:
             what = name.replace("_", " ")
-            detail = (
-                f": {getattr(config, name)}, not {value}" if name == "robot" else ""
-            )
+            detail = f": {trained}, not {value}" if name == "robot" else ""
             raise InputError(f"The policy in {path} is for another {what}{detail}.")
     return build_network(path, Actor, config, tensors).eval()

@@ -1,4 +1,4 @@
-"""How the world of an episode differs from the model.
+"""How the world of an episode, and what is measured of it, differ from the model.
 
 Domain randomization (Tobin et al. 2017; Tan et al. 2018, "Sim-to-real") draws a Domain
 for each episode; :mod:`loco_drake.systems.domain` sets it in a Context.
@@ -13,12 +13,21 @@ from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError, check_number
 from loco_drake.common.immutable import Immutable
+from loco_drake.common.rotations import quat_exp, quat_multiply, quat_rotate
+from loco_drake.control.state import (
+    ANGULAR_VELOCITY,
+    JOINT_VELOCITIES,
+    JOINTS,
+    ORIENTATION,
+    POSITION,
+    VELOCITY,
+    split,
+)
 from loco_drake.models.parameters import LEAST_PAYLOAD
 
 Array = NDArray[np.float64]
 
 MAX_LATENCY = 0.1  # s
-_JOINTS = 12
 # Name and size of each part of a sensor error, in order.
 ERROR_LAYOUT = (
     ("orientation", 3),  # rotation vector in B, rad
@@ -117,10 +126,52 @@ class Domain(_Checked, Immutable):
     sensors: SensorErrors | None = None  # errors of the measured state
 
     def __post_init__(self) -> None:
-        self._check("domain", {"com_shift": 3, "strength": _JOINTS}, **BOUNDS)
+        self._check("domain", {"com_shift": 3, "strength": 12}, **BOUNDS)
 
     def needs(self, name: str) -> bool:
         """Returns whether this domain requires the disturbance ``name``."""
         if name == "actuation":
             return self.strength is not None or self.latency > 0
         return bool(self.pushes) if name == "pushes" else self.sensors is not None
+
+
+def error_vector(**sizes: float) -> Array:
+    """Returns an error (ERROR_SIZE,) with the named parts set and all others 0."""
+    unknown = sizes.keys() - dict(ERROR_LAYOUT).keys()
+    if unknown:
+        raise TypeError(f"errors have no part {', '.join(sorted(unknown))}")
+    return np.concatenate(
+        [np.full(size, sizes.get(name, 0.0)) for name, size in ERROR_LAYOUT]
+    )
+
+
+def draw_error(errors: SensorErrors, sample: int) -> Array:
+    """Returns the error (ERROR_SIZE,) of one sample of the clock, deterministically."""
+    random = np.random.default_rng((errors.seed, sample))
+    return errors.bias + errors.white * random.standard_normal(ERROR_SIZE)
+
+
+def measure(state: Array, error: Array) -> Array:
+    """Returns measured states [q, v], shape (..., 37).
+
+    The observation is computed from the measured state, so an encoder error affects
+    every part that depends on it.
+
+    Args:
+        state: the plant's [q, v], shape (..., 37).
+        error: see :data:`ERROR_LAYOUT`, shape (..., ERROR_SIZE).
+    """
+    ends = np.cumsum([size for _, size in ERROR_LAYOUT])
+    rotation, position, joints, w_B, v_B, joint_velocities = np.split(
+        error, ends[:-1], axis=-1
+    )
+    measured = state.copy()
+    q, v = split(measured)
+    q_WB = state[ORIENTATION]
+    q[ORIENTATION] = quat_multiply(q_WB, quat_exp(rotation))
+    q[POSITION] += position
+    q[JOINTS] += joints
+    v[ANGULAR_VELOCITY] += quat_rotate(q_WB, w_B)
+    v[VELOCITY] += quat_rotate(q_WB, v_B)
+    v[JOINT_VELOCITIES] += joint_velocities
+    return measured

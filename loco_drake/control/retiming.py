@@ -13,13 +13,7 @@ from toppra.interpolator import AbstractGeometricPath
 from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import quat_continuous
 from loco_drake.control.action import GRAVITY
-from loco_drake.control.plan import (
-    PLAN_DT,
-    Plan,
-    join_plans,
-    make_plan,
-    standing_plan,
-)
+from loco_drake.control.plan import PLAN_DT, Plan, join_plans, make_plan, standing_plan
 from loco_drake.control.state import HEIGHT, JOINTS, ORIENTATION
 from loco_drake.models.robots import Robot
 
@@ -50,8 +44,8 @@ def path_limits(robot: Robot) -> PathLimits:
     carries load, but hardly accelerates.
 
     The base cannot accelerate downward faster than gravity, since feet push but do not
-    pull. Motion of an animal or robot smaller than this one violates this limit in
-    flight; slowed until it satisfies the limit, it can be tracked.
+    pull. Motion of something smaller than this robot violates this limit in flight;
+    slowed until it satisfies the limit, it can be tracked.
     """
     joints = robot.effort_limits / robot.joint_inertia
     return PathLimits(
@@ -69,9 +63,9 @@ class _ClockedPath(AbstractGeometricPath):
     time-optimal, from playing the plan faster than it is.
     """
 
-    def __init__(self, spline: CubicSpline, start: float, end: float) -> None:
+    def __init__(self, spline: CubicSpline, interval: Array) -> None:
         self._spline = spline
-        self._interval = np.array([start, end])
+        self._interval = interval
 
     def __call__(self, path_positions: float | Array, order: int = 0) -> Array:
         s = np.asarray(path_positions, dtype=np.float64)
@@ -85,10 +79,6 @@ class _ClockedPath(AbstractGeometricPath):
     @property
     def path_interval(self) -> Array:
         return self._interval
-
-    @property
-    def waypoints(self) -> tuple[Array, Array]:
-        return self._interval, self(self._interval)
 
 
 class _FreeEndTOPPRA(TOPPRA):
@@ -125,15 +115,12 @@ def retime(
         times: plan times of the waypoints, s, shape (N,). They may extend beyond
             ``start`` and ``end``, which makes the spline independent of both.
         waypoints: coordinates at these times, shape (N, D).
-        limits: limits to satisfy.
-        start: plan time at the start, s.
-        end: plan time up to which to satisfy the limits, s.
-        commit: plan time at which to stop, s. The rest, up to ``end``, ensures that
+        limits: limits to satisfy from ``start`` to ``end``.
+        start: plan time, s.
+        end: plan time, s.
+        commit: plan time of the clock's end, s. The rest, up to ``end``, ensures that
             the motion can continue.
         start_rate: ds/dt at ``start``; lowered if it makes the limits infeasible.
-
-    Returns:
-        The clock from ``start`` up to ``commit``, at multiples of PLAN_DT.
     """
     spline = CubicSpline(times, waypoints)
     count = max(2, round((end - start) / (0.5 * PLAN_DT)))
@@ -147,12 +134,11 @@ def retime(
 
 
 def _feasible(spline: CubicSpline, grid: Array, limits: PathLimits) -> bool:
+    slow = np.abs(spline(grid, 1)) <= limits.speed
+    lower, upper = limits.acceleration.T
     acceleration = spline(grid, 2)
-    return bool(
-        (np.abs(spline(grid, 1)) <= limits.speed).all()
-        and (acceleration >= limits.acceleration[:, 0]).all()
-        and (acceleration <= limits.acceleration[:, 1]).all()
-    )
+    soft = (lower <= acceleration) & (acceleration <= upper)
+    return bool(slow.all() and soft.all())
 
 
 def _solve(
@@ -161,12 +147,11 @@ def _solve(
     """Returns ds/dt at the grid points by TOPP-RA."""
     speed = np.append(limits.speed, 1.0)
     clock = [[-1.0 / _CLOCK_STOP_TIME, 1.0 / _CLOCK_STOP_TIME]]
-    acceleration = np.append(limits.acceleration, clock, axis=0)
     constraints = [
         JointVelocityConstraint(np.stack((-speed, speed), axis=1)),
-        JointAccelerationConstraint(acceleration),
+        JointAccelerationConstraint(np.append(limits.acceleration, clock, axis=0)),
     ]
-    path = _ClockedPath(spline, grid[0], grid[-1])
+    path = _ClockedPath(spline, grid[[0, -1]])
     solver = _FreeEndTOPPRA(constraints, path, gridpoints=grid, solver_wrapper="seidel")
     controllable = np.sqrt(solver.compute_controllable_sets(0.0, 1.0)[0])
     # If the plan violates the limits at its start, the clock has to jump.
@@ -247,11 +232,11 @@ def smooth_chunk(
     )
     if not begun:
         plan = _follow(robot, raw, window, clock, progress.plan.start_time)
+    elif len(clock.path_time) == 1:
+        return None
     else:
         # The first sample is the last committed one.
         clock = Clock(clock.path_time[1:], clock.rate[1:])
-        if not len(clock.path_time):
-            return None
         added = _follow(robot, raw, window, clock, progress.plan.end_time + PLAN_DT)
         plan = join_plans(progress.plan, added)
     return Progress(plan, float(clock.path_time[-1]), float(clock.rate[-1]), raw)

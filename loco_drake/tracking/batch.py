@@ -5,8 +5,7 @@ from numpy.typing import NDArray
 
 from loco_drake.common.rotations import quat_to_matrix
 from loco_drake.control.action import joint_targets, set_points
-from loco_drake.control.domain import Domain
-from loco_drake.control.measurement import draw_error, measure
+from loco_drake.control.domain import Domain, draw_error, measure
 from loco_drake.control.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.reward import reward_terms

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError, check_bounds
-from loco_drake.control.domain import BOUNDS, Domain, Push, SensorErrors
-from loco_drake.control.measurement import error_vector
+from loco_drake.control.domain import BOUNDS, Domain, Push, SensorErrors, error_vector
 
 # Commands have these ranges as options; their --help does not wait for Drake.
 if TYPE_CHECKING:

@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from loco_drake.control.domain import Domain, SensorErrors
-from loco_drake.control.measurement import (
+from loco_drake.control.domain import (
     ERROR_LAYOUT,
     ERROR_SIZE,
+    Domain,
+    SensorErrors,
     draw_error,
     error_vector,
     measure,
