@@ -1,0 +1,290 @@
+"""Steering: a plan whose ground path is bent until the base moves as commanded.
+
+The base keeps its height, its roll and pitch and its swaying within a stride; its mean
+velocity becomes the commanded one. A foot that stands is carried over by the transform
+of the path at the middle of its stance, and stays there. A foot that swings moves with
+the base, with an offset that goes smoothly from one foothold to the next. The legs
+follow in closed form.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loco_drake.common.errors import InputError
+from loco_drake.common.rotations import (
+    angular_velocity,
+    quat_conjugate,
+    quat_continuous,
+    quat_multiply,
+    quat_rotate,
+    yaw_quat,
+)
+from loco_drake.control.ground_path import (
+    filtered,
+    ground_pose,
+    integrate,
+    pace,
+    path_velocity,
+    rotate,
+)
+from loco_drake.control.plan import PLAN_DT, Plan, make_plan
+from loco_drake.control.state import JOINTS, ORIENTATION, POSITION
+from loco_drake.models.robots import Robot
+
+Array = NDArray[np.float64]
+
+# No command beyond these is followed; most gaits end far below.
+MOST_COMMAND = np.array([4.0, 2.0, 4.0])  # m/s, m/s, rad/s
+
+# Samples before touchdown from which a foot's landing no longer changes.
+_LATE = 6
+_REACH_TOLERANCE = 2e-3  # m by which a toe may miss its place
+# Shares of a command that are tried until legs and joints can follow it.
+_SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Steered:
+    """A steered plan and what is needed to steer it on. It is immutable.
+
+    The arrays have one row for each sample of the plan.
+    """
+
+    raw: Plan  # the plan before steering
+    plan: Plan  # the plan after steering, on the same clock
+    command: Array  # the command, as far as it can be followed, shape (3,)
+    speed: Array  # filtered command, m/s and rad/s, shape (N, 3)
+    rate: Array  # time derivative of ``speed``, shape (N, 3)
+    pose: Array  # of the base on the ground, x, y, yaw, shape (N, 3)
+    # From where each toe would be if it moved with the base to where it is, m in W,
+    # shape (N, 4, 2).
+    offset: Array
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Steered":
+        return self
+
+    def speed_at(self, path_time: float) -> Array:
+        """Returns the velocity that the plan has at this plan time, shape (3,)."""
+        times = self.plan.path_time
+        return np.array([np.interp(path_time, times, s) for s in self.speed.T])
+
+
+def begin(raw: Plan) -> Steered:
+    """Returns ``raw`` not steered yet: the command is the pace that it has."""
+    pose = ground_pose(raw.q)
+    speed = pace(path_velocity(pose))
+    offset = np.zeros((len(raw), 4, 2))
+    return Steered(raw, raw, speed[-1], speed, np.zeros_like(speed), pose, offset)
+
+
+def steer(
+    robot: Robot,
+    before: Steered,
+    raw: Plan,
+    command: Array,
+    fixed: float,
+    response: float,
+) -> Steered:
+    """Returns ``raw`` steered by a command, continuing ``before``.
+
+    Legs that would have to reach or move farther than they can get the largest share of
+    the command's change that they can follow.
+
+    Args:
+        robot: the robot.
+        before: the steered plan so far.
+        raw: the plan to steer, equal to ``before.raw`` up to ``fixed``.
+        command: forward and sideways velocity in m/s and yaw rate in rad/s, in the
+            heading frame, shape (3,).
+        fixed: plan time up to which the plan must not change, s.
+        response: time in which 90 % of a step of the command is covered, s.
+
+    Raises:
+        InputError: if a number of the command is not finite.
+    """
+    if not np.isfinite(command).all():
+        raise InputError(
+            "A command must be three finite numbers: forward and sideways m/s and yaw "
+            f"rate rad/s; not {', '.join(f'{value:g}' for value in command)}."
+        )
+    command = np.clip(command, -MOST_COMMAND, MOST_COMMAND)
+    drop = round((raw.path_time[0] - before.raw.path_time[0]) / PLAN_DT)
+    before = _tail(before, drop)
+    last = int(np.ceil((fixed - raw.path_time[0]) / PLAN_DT - 1e-6))
+    last = min(max(last, 0), len(before.plan) - 1, len(raw) - 1)
+    natural = pace(path_velocity(ground_pose(raw.q)))
+    now = natural[last:].mean(axis=0)
+    best: tuple[float, Steered] | None = None
+    for share in _SHARES:
+        wanted = now + share * (command - now)
+        bent, excess = _bend(robot, before, raw, natural, wanted, last, response)
+        if best is None or excess < best[0]:
+            best = excess, bent
+        if excess <= 0:
+            break
+    assert best is not None
+    return best[1]
+
+
+def _tail(steered: Steered, first: int) -> Steered:
+    """Returns the samples from ``first`` on."""
+    if first <= 0:
+        return steered
+    rows = {
+        name: getattr(steered, name)[first:]
+        for name in ("speed", "rate", "pose", "offset")
+    }
+    return replace(
+        steered, raw=steered.raw.tail(first), plan=steered.plan.tail(first), **rows
+    )
+
+
+def _bend(
+    robot: Robot,
+    before: Steered,
+    raw: Plan,
+    natural: Array,
+    command: Array,
+    last: int,
+    response: float,
+) -> tuple[Steered, float]:
+    """Returns ``raw`` bent after sample ``last``, and by how much legs fall short.
+
+    The latter is positive if a toe misses its place by more than the tolerance or a
+    joint is faster than its limit; the unit is that of these limits.
+    """
+    count = len(raw) - 1 - last
+    speed, rate = filtered(
+        command, before.speed[last], before.rate[last], response, count
+    )
+    speed = np.concatenate((before.speed[: last + 1], speed))
+    rate = np.concatenate((before.rate[: last + 1], rate))
+    raw_pose = ground_pose(raw.q)
+    change = (speed - natural)[last:]
+    velocity = path_velocity(raw_pose[last:]) + (change[:-1] + change[1:]) / 2
+    pose = np.concatenate(
+        (before.pose[: last + 1], integrate(before.pose[last], velocity))
+    )
+    turn = pose[:, 2] - raw_pose[:, 2]
+    carried = pose[:, None, :2] + rotate(
+        raw.p_WF[..., :2] - raw_pose[:, None, :2], turn[:, None]
+    )
+    offset = np.stack(
+        [_foot_offset(before, raw, foot, pose, carried, last) for foot in range(4)],
+        axis=1,
+    )
+    p_WF = raw.p_WF.copy()
+    p_WF[..., :2] = carried + offset
+    q = raw.q.copy()
+    q[ORIENTATION] = quat_multiply(yaw_quat(turn), raw.q[ORIENTATION])
+    q[POSITION][:, :2] = pose[:, :2]
+    p_BF = quat_rotate(
+        quat_conjugate(q[ORIENTATION])[:, None], p_WF - q[POSITION][:, None]
+    )
+    q[JOINTS] = robot.nearest_joints(p_BF)
+    q[: last + 1] = before.plan.q[: last + 1]
+    q[ORIENTATION] = quat_continuous(q[ORIENTATION])
+    v = np.concatenate(
+        (
+            angular_velocity(q[ORIENTATION], PLAN_DT),
+            np.gradient(q[:, 4:], PLAN_DT, axis=0),
+        ),
+        axis=1,
+    )
+    v[: last + 1] = before.plan.v[: last + 1]
+    plan = make_plan(
+        robot,
+        q=q,
+        v=v,
+        contacts=raw.contacts,
+        labels=raw.labels,
+        start_time=raw.start_time,
+        path_time=raw.path_time,
+        open_ended=raw.open_ended,
+    )
+    missed = robot.toe_positions(q[last + 1 :, 7:]) - p_BF[last + 1 :]
+    # The smoother slows what is too fast already.
+    fast, raw_fast = (
+        np.abs(each.v[last + 1 :, 6:] / robot.joint_speed_limits).max(initial=0.0)
+        for each in (plan, raw)
+    )
+    excess = max(
+        np.abs(missed).max(initial=0.0) / _REACH_TOLERANCE - 1,
+        fast - max(raw_fast, 1.0),
+    )
+    return Steered(raw, plan, command, speed, rate, pose, offset), excess
+
+
+def _foot_offset(
+    before: Steered, raw: Plan, foot: int, pose: Array, carried: Array, last: int
+) -> Array:
+    """Returns the offset of one foot, unchanged up to sample ``last``, (N, 2)."""
+    raw_pose = ground_pose(raw.q)
+    toe, carried = raw.p_WF[:, foot, :2], carried[:, foot]
+    slope_toe, slope_carried = (np.gradient(a, axis=0) for a in (toe, carried))
+    old = before.offset[:, foot]
+    offset = np.zeros_like(toe)
+    offset[: last + 1] = old[: last + 1]
+    turn = pose[:, 2] - raw_pose[:, 2]
+    # Where a swing begins: sample, offset and its slope per sample.
+    begun = last
+    slope = old[min(last + 1, len(old) - 1)] - old[max(last - 1, 0)]
+    slope = slope / max(min(last + 1, len(old) - 1) - max(last - 1, 0), 1)
+    usual = 0  # samples of a stance that is complete
+    for start, end in _stances(raw.contacts[:, foot], last):
+        span = slice(max(start, last + 1), end + 1)
+        late = start - last <= _LATE and start < len(old)
+        if late:
+            # The foot stands already, or lands where it was going to.
+            swing = slice(last + 1, start)
+            offset[swing] = old[swing]
+            here = max(start, last)
+            placed = carried[here] + old[here]
+            angle = turn[here]
+            offset[span] = (
+                placed + rotate(toe[span] - toe[here], angle) - carried[span]
+            )
+        else:
+            middle = (start + end) / 2
+            if end == len(toe) - 1 and raw.open_ended:
+                middle = max(middle, start + usual / 2)
+            angle = np.interp(middle, np.arange(len(turn)), turn)
+            from_, to = (
+                np.array(
+                    [np.interp(middle, np.arange(len(p)), p[:, i]) for i in (0, 1)]
+                )
+                for p in (raw_pose, pose)
+            )
+            offset[span] = to + rotate(toe[span] - from_, angle) - carried[span]
+            there = rotate(slope_toe[start], angle) - slope_carried[start]
+            offset[begun + 1 : start] = _hermite(
+                offset[begun], slope, offset[start], there, start - begun
+            )
+        begun, usual = end, end - start
+        slope = rotate(slope_toe[end], angle) - slope_carried[end]
+    if begun < len(toe) - 1:
+        left = len(toe) - begun
+        offset[begun + 1 :] = _hermite(offset[begun], slope, 0 * slope, 0 * slope, left)
+    return offset
+
+
+def _stances(contact: NDArray[np.bool_], last: int) -> Iterator[tuple[int, int]]:
+    """Yields first and last sample of the stances that end after sample ``last``."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], contact, [False]))))
+    for start, end in zip(edges[::2], edges[1::2] - 1, strict=True):
+        if end > last:
+            yield int(start), int(end)
+
+
+def _hermite(a: Array, slope_a: Array, b: Array, slope_b: Array, steps: int) -> Array:
+    """Returns the inner points of a cubic from ``a`` to ``b``, (steps - 1, 2)."""
+    x = (np.arange(1, steps) / steps)[:, None]
+    rest = 1 - x
+    return (
+        rest * rest * ((1 + 2 * x) * a + x * steps * slope_a)
+        + x * x * ((1 + 2 * rest) * b - rest * steps * slope_b)
+    )
