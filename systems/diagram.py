@@ -42,6 +42,7 @@ from .scenario import (
     Scenario,
     TrainedPolicy,
 )
+from .steering import Steering
 from .toppra_smoother import ToppraSmoother
 
 
@@ -75,12 +76,15 @@ def MakeLocomotionDiagram(
         name: LocomotionDiagram
         input_ports:
         - gait: vector (1,), index into LABELS; only of a generated reference, optional
+        - command: vector (3,), velocity to follow: forward, sideways, yaw rate, in the
+          heading frame; m/s, rad/s; optional
         - action: vector (J,); ACTION_SCALE; only with ExternalAction
         - desired_state: vector (2 J,), [q_d, 0]; rad, rad/s; only with ExternalTargets
         output_ports:
         - plan: abstract, Plan; the plan that is tracked
         - plan_state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s
         - path_time: vector (1,), time before smoothing; s
+        - followed: vector (3,), the command as far as it is followed; m/s, rad/s
         - observation: vector (OBSERVATION_SIZE,); see OBSERVATION_LAYOUT
         - action: vector (J,), the action in use; ACTION_SCALE
         - desired_state: vector (2 J,), [q_d, 0]; rad, rad/s
@@ -91,7 +95,8 @@ def MakeLocomotionDiagram(
     With ExternalTargets the only output ports are state and net_actuation. The
     quaternions in plan_state and state have length one.
 
-    The subsystems are named plant, scene_graph, robot_state, reference, smoother,
+    The subsystems are named plant, scene_graph, robot_state, reference, steering,
+    smoother,
     observation, policy, joint_targets, plan_state and reward; the scenario's
     disturbances add actuation, pushes and sensors. A robot must start on its plan, so
     simulate it like this::
@@ -217,20 +222,28 @@ def _AddDisturbances(
 
 
 def _AddPlan(builder: DiagramBuilder, made: Locomotion, scenario: Scenario) -> None:
-    """Adds the reference and the smoother."""
+    """Adds the reference, its steering and the smoother."""
     reference = _Add(builder, "reference", _MakeReference(made.robot, scenario))
-    plan = reference.GetOutputPort("plan")
+    chain = [reference]
     if reference.HasInputPort("gait"):
         made.inputs["gait"] = reference.GetInputPort("gait")
+    if scenario.steering is not None:
+        steering = Steering(made.robot, scenario.steering)
+        _Add(builder, "steering", steering, plan=chain[-1].GetOutputPort("plan"))
+        made.inputs["command"] = steering.GetInputPort("command")
+        made.outputs["followed"] = steering.GetOutputPort("followed")
+        chain.append(steering)
     if scenario.smoother is not None:
         smoother = ToppraSmoother(made.robot, scenario.smoother)
-        _Add(builder, "smoother", smoother, plan=plan)
-        plan = smoother.GetOutputPort("plan")
-        if reference.HasInputPort("path_time"):
-            builder.Connect(
-                smoother.GetOutputPort("path_time"), reference.GetInputPort("path_time")
-            )
-    made.outputs["plan"] = plan
+        _Add(builder, "smoother", smoother, plan=chain[-1].GetOutputPort("plan"))
+        for system in chain:
+            for name in ("path_time", "fixed_time"):
+                if system.HasInputPort(name):
+                    builder.Connect(
+                        smoother.GetOutputPort(name), system.GetInputPort(name)
+                    )
+        chain.append(smoother)
+    made.outputs["plan"] = chain[-1].GetOutputPort("plan")
 
 
 def _MakeReference(robot: Robot, scenario: Scenario) -> LeafSystem:

@@ -3,7 +3,7 @@
 from typing import Any
 
 from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import Context, LeafSystem, State
+from pydrake.systems.framework import Context, DependencyTicket, LeafSystem, State
 
 from loco_drake.control.plan import UPDATE_PERIOD
 
@@ -12,17 +12,22 @@ class PlanProducer(LeafSystem):
     """Base of systems whose abstract state is an immutable value with a ``plan``.
 
     The plan is their output port ``plan``. It depends on the state only, so the inputs
-    of the system may depend on it.
+    of the system may depend on it, unless they are declared.
     """
 
-    def _DeclarePlan(self, first: Any) -> None:
-        """Declares state, port and update; ``first`` is the default state."""
+    def _DeclarePlan(self, first: Any, *inputs: DependencyTicket) -> None:
+        """Declares state, port and update.
+
+        Args:
+            first: the default state.
+            inputs: tickets of input ports on which the plan depends, too.
+        """
         self._index = int(self.DeclareAbstractState(Value(first)))
         self.DeclareAbstractOutputPort(
             "plan",
             lambda: Value(first.plan),
             self._calc_plan,
-            prerequisites_of_calc={self.xa_ticket()},
+            prerequisites_of_calc={self.xa_ticket(), *inputs},
         )
         self.DeclarePeriodicUnrestrictedUpdateEvent(UPDATE_PERIOD, 0.0, self._update)
 

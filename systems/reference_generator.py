@@ -3,12 +3,13 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.immutable import Immutable
-from loco_drake.control.plan import PLAN_DT, Plan, join_plans, make_plan
-from loco_drake.generation.generate import chunk_labels
+from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD, Plan, join_plans, make_plan
+from loco_drake.generation.generate import token_labels
 from loco_drake.generation.motion_model import (
     MotionModel,
     Stream,
@@ -20,16 +21,35 @@ from loco_drake.motion.gaits import LABELS, GaitLabel, GaitSchedule, parse_sched
 from .plan_producer import PlanProducer
 from .scenario import GeneratedReference
 
-_KEEP = 1.0  # seconds of plan kept behind what has been used up
+_KEEP = 1.0  # seconds of plan kept behind what can no longer change
+
+
+@dataclass(frozen=True, eq=False)
+class _Chunk(Immutable):
+    """One call of the motion model."""
+
+    before: Stream  # the stream that it extended
+    frames: int  # frames of the plan before it
+    lead: int  # tokens at its beginning that only gave context
+    tokens: NDArray[np.int64]  # shape (1, n, codebooks)
+    labels: NDArray[np.int64]  # of the tokens, shape (1, n)
 
 
 @dataclass(frozen=True, eq=False)
 class _Script(Immutable):
-    """The plan so far and how to continue it."""
+    """The plan so far and how to continue it, from its end or from a token before."""
 
     schedule: GaitSchedule
     stream: Stream
     plan: Plan | None = None
+    chunks: tuple[_Chunk, ...] = ()
+
+    @property
+    def frames(self) -> int:
+        """Number of frames generated so far, which is that of the next one."""
+        if self.plan is None:
+            return 0
+        return round(self.plan.path_time[-1] / PLAN_DT) + 1
 
 
 class ReferenceGenerator(PlanProducer):
@@ -41,15 +61,16 @@ class ReferenceGenerator(PlanProducer):
         input_ports:
         - gait: vector (1,), index into LABELS; optional
         - path_time: vector (1,), how much of the plan has been used; s; optional
+        - fixed_time: vector (1,), plan time up to which nothing changes; s; optional
         output_ports:
         - plan: abstract, Plan; open-ended
 
-    ``path_time`` comes from the smoother; without it the Context's time is used. The
-    configured gait may be a schedule, whose times are on the plan's clock and are kept
-    to one token. The port ``gait`` overrides the schedule for chunks not yet generated,
-    so a change takes effect after ``horizon`` and up to one chunk. The output depends
-    only on the seed, the chunk's number and the labels: a cloned or reset Context
-    repeats it exactly.
+    ``path_time`` and ``fixed_time`` come from the smoother; without it the Context's
+    time and ``path_time`` are used. The configured gait may be a schedule, whose times
+    are on the plan's clock and are kept to one token. The port ``gait`` overrides the
+    schedule: what comes later than ``fixed_time`` by an update and up to a token is
+    generated again. The output depends only on the seed, the chunks' numbers and the
+    labels: a cloned or reset Context repeats it exactly.
 
     Args:
         robot: the robot.
@@ -77,6 +98,7 @@ class ReferenceGenerator(PlanProducer):
         self._model = model or pretrained_motion_model(robot.name)
         self._gait = self.DeclareVectorInputPort("gait", 1)
         self._path_time = self.DeclareVectorInputPort("path_time", 1)
+        self._fixed_time = self.DeclareVectorInputPort("fixed_time", 1)
         self._DeclarePlan(self._begun(self._config.gait, self._config.seed))
 
     def SetReference(
@@ -107,16 +129,22 @@ class ReferenceGenerator(PlanProducer):
         )
         schedule = parse_schedule(gait)
         self._model.check_labels(schedule.at(schedule.starts))
-        return self._written(_Script(schedule, stream), 0.0)
+        return self._written(_Script(schedule, stream), 0.0, 0.0)
 
     def _next(self, context: Context, script: _Script) -> _Script:
-        if self._gait.HasValue(context):
-            gait = self._label(self._gait.Eval(context)[0])
-            script = replace(script, schedule=GaitSchedule((gait,)))
         used = context.get_time()
         if self._path_time.HasValue(context):
             used = float(self._path_time.Eval(context)[0])
-        return self._written(script, used)
+        fixed = used
+        if self._fixed_time.HasValue(context):
+            fixed = float(self._fixed_time.Eval(context)[0])
+        if self._gait.HasValue(context):
+            schedule = GaitSchedule((self._label(self._gait.Eval(context)[0]),))
+            if schedule != script.schedule:
+                script = self._rewound(script, fixed + UPDATE_PERIOD)
+                script = replace(script, schedule=schedule)
+                used = min(used, fixed)
+        return self._written(script, used, fixed)
 
     def _label(self, index: float) -> GaitLabel:
         """Returns the gait that the input port selects."""
@@ -130,31 +158,73 @@ class ReferenceGenerator(PlanProducer):
             )
         return choices[int(index)]
 
-    def _written(self, script: _Script, used: float) -> _Script:
+    def _rewound(self, script: _Script, time: float) -> _Script:
+        """Returns ``script`` up to its first token that begins at ``time`` or later."""
+        per_token = self._model.frames_per_token
+        token = int(np.ceil(time / PLAN_DT / per_token - 1e-6))
+        if token * per_token >= script.frames or script.plan is None:
+            return script
+        chunks = [c for c in script.chunks if c.frames < token * per_token]
+        last = chunks.pop()
+        tokens = last.lead + token - last.frames // per_token
+        stream, _ = self._model.append(
+            last.before, last.tokens[:, :tokens], last.labels[:, :tokens]
+        )
+        cut = replace(last, tokens=last.tokens[:, :tokens])
+        end = token * per_token - round(script.plan.start_time / PLAN_DT)
+        plan = script.plan.slice(0, end)
+        return replace(script, stream=stream, plan=plan, chunks=(*chunks, cut))
+
+    def _written(self, script: _Script, used: float, fixed: float) -> _Script:
         """Returns ``script`` with chunks added until the horizon is reached."""
-        plan, stream = script.plan, script.stream
-        while plan is None or plan.path_time[-1] < used + self._horizon:
-            labels = chunk_labels(self._model, script.schedule, stream.chunk)
-            stream, frames = self._model.extend(
-                stream,
-                labels[None],
-                temperature=self._config.temperature,
-                top_p=self._config.top_p,
-            )
-            count = 0 if plan is None else round(plan.path_time[-1] / PLAN_DT) + 1
-            chunk = frames[0]
-            added = make_plan(
-                self._robot,
-                q=chunk.q,
-                v=chunk.v,
-                contacts=chunk.contacts,
-                labels=chunk.labels,
-                start_time=count * PLAN_DT,
-                path_time=PLAN_DT * np.arange(count, count + len(chunk.q)),
-                open_ended=True,
-            )
-            plan = added if plan is None else join_plans(plan, added)
-        old = int(np.searchsorted(plan.path_time, used - _KEEP))
+        while script.frames * PLAN_DT <= used + self._horizon:
+            script = self._extended(script)
+        plan, chunks = script.plan, script.chunks
+        assert plan is not None
+        old = int(np.searchsorted(plan.path_time, fixed - _KEEP))
         if old > self._model.chunk_frames:
-            plan = plan.tail(old)
-        return replace(script, stream=stream, plan=plan)
+            plan = plan.slice(old)
+            first = round(plan.start_time / PLAN_DT)
+            chunks = tuple(
+                chunk
+                for chunk, later in zip(chunks, [*chunks[1:], None], strict=True)
+                if later is None or later.frames > first
+            )
+            script = replace(script, plan=plan, chunks=chunks)
+        return script
+
+    def _extended(self, script: _Script) -> _Script:
+        """Returns ``script`` with one more chunk."""
+        plan, count = script.plan, script.frames
+        labels = token_labels(
+            self._model, script.schedule, count // self._model.frames_per_token
+        )
+        before = script.stream
+        stream, frames = self._model.extend(
+            before,
+            labels[None],
+            temperature=self._config.temperature,
+            top_p=self._config.top_p,
+        )
+        new = frames[0]
+        added = make_plan(
+            self._robot,
+            q=new.q,
+            v=new.v,
+            contacts=new.contacts,
+            labels=new.labels,
+            start_time=count * PLAN_DT,
+            path_time=PLAN_DT * np.arange(count, count + len(new.q), dtype=np.float64),
+            open_ended=True,
+        )
+        lead = 0 if before.chunk else self._model.lead
+        tokens = len(labels) + lead
+        chunk = _Chunk(
+            before, count, lead, stream.tokens[:, -tokens:], stream.labels[:, -tokens:]
+        )
+        return replace(
+            script,
+            stream=stream,
+            plan=added if plan is None else join_plans(plan, added),
+            chunks=(*script.chunks, chunk),
+        )

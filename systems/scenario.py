@@ -76,6 +76,18 @@ class SmootherConfig:
 
 
 @dataclass(kw_only=True)
+class SteeringConfig:
+    """How a plan follows the command, if the port "command" has a value."""
+
+    # Seconds in which the plan covers 90 % of a step of the command.
+    response: float = 0.6
+
+    def check(self) -> None:
+        """Raises InputError unless every field is valid."""
+        check_number("The steering's response", self.response, 0.1, 10.0)
+
+
+@dataclass(kw_only=True)
 class TrainedPolicy:
     """A trained policy."""
 
@@ -116,6 +128,8 @@ class Scenario:
     reference: GeneratedReference | MotionReference | PlanReference = field(
         default_factory=GeneratedReference
     )
+    # Steering of the motion by the port "command"; null to leave it out.
+    steering: SteeringConfig | None = field(default_factory=SteeringConfig)
     # Re-timing of the motion; null to track it as it is.
     smoother: SmootherConfig | None = field(default_factory=SmootherConfig)
     policy: TrainedPolicy | ExternalAction | ExternalTargets = field(
@@ -137,6 +151,8 @@ class Scenario:
         self.plant.check()
         if isinstance(self.reference, GeneratedReference):
             self.reference.check()
+        if self.steering is not None:
+            self.steering.check()
         if self.smoother is not None:
             self.smoother.check()
         rate = self.simulator.target_realtime_rate

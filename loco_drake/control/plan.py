@@ -118,9 +118,11 @@ class Plan(Immutable):
         """Context time of the last sample, s."""
         return self.start_time + (len(self) - 1) * PLAN_DT
 
-    def tail(self, first: int) -> "Plan":
-        """Returns the plan from sample ``first`` on."""
-        arrays: dict[str, Any] = {name: getattr(self, name)[first:] for name in _ARRAYS}
+    def slice(self, first: int, end: int | None = None) -> "Plan":
+        """Returns the samples from ``first`` on, up to ``end`` (exclusive)."""
+        arrays: dict[str, Any] = {
+            name: getattr(self, name)[first:end] for name in _ARRAYS
+        }
         return replace(self, start_time=self.start_time + first * PLAN_DT, **arrays)
 
     def index(self, time: float) -> int:
@@ -197,6 +199,26 @@ def join_plans(first: Plan, second: Plan) -> Plan:
         for name in _ARRAYS
     }
     return replace(second, start_time=first.start_time, **arrays)
+
+
+def first_change(before: Plan, after: Plan) -> float:
+    """Returns the plan time of the first sample of ``after`` that is not in ``before``.
+
+    Of an extended plan this is the first new sample, and of the same plan the time
+    after its end. Samples that ``after`` has dropped don't count.
+    """
+    time = float(after.path_time[0])
+    k = int(np.searchsorted(before.path_time, time))
+    n = min(len(before) - k, len(after))
+    same = (
+        (before.path_time[k : k + n] == after.path_time[:n])
+        & (before.q[k : k + n] == after.q[:n]).all(axis=1)
+        & (before.labels[k : k + n] == after.labels[:n])
+    )
+    count = n if same.all() else int(same.argmin())
+    if count < len(after):
+        return float(after.path_time[count])
+    return float(after.path_time[-1]) + PLAN_DT
 
 
 def standing_plan(robot: Robot, start_time: float = 0.0) -> Plan:

@@ -1,6 +1,6 @@
 """TOPP-RA along a plan, which slows it to the limits and never speeds it up."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import toppra
@@ -13,7 +13,14 @@ from toppra.interpolator import AbstractGeometricPath
 from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import quat_continuous
 from loco_drake.control.action import GRAVITY
-from loco_drake.control.plan import PLAN_DT, Plan, join_plans, make_plan, standing_plan
+from loco_drake.control.plan import (
+    PLAN_DT,
+    Plan,
+    first_change,
+    join_plans,
+    make_plan,
+    standing_plan,
+)
 from loco_drake.control.state import HEIGHT, JOINTS, ORIENTATION
 from loco_drake.models.robots import Robot
 
@@ -181,23 +188,37 @@ class Progress(Immutable):
     """The state of re-timing a plan."""
 
     plan: Plan  # the re-timed plan
-    path_time: float = 0.0  # plan time of its last sample, s
-    rate: float = 1.0  # ds/dt of its last sample
+    rate: Array  # ds/dt of each of its samples, shape (N,)
     source: Plan | None = None  # the plan that was re-timed; None at first
 
-    def goes_on_in(self, raw: Plan) -> bool:
-        """Returns whether ``raw`` contains the sample that was re-timed last.
+    @property
+    def path_time(self) -> float:
+        """Plan time of the last sample, s."""
+        return float(self.plan.path_time[-1])
 
-        If it does not, it is another motion rather than an extension of the same one.
-        """
-        source = self.source
-        if source is None or raw is source:
-            return source is not None
-        here, there = (
-            plan.q[int(np.searchsorted(plan.path_time, self.path_time)) :][:1]
-            for plan in (source, raw)
+    def slice(self, first: int, end: int | None = None) -> "Progress":
+        """Returns the samples from ``first`` on, up to ``end`` (exclusive)."""
+        return replace(
+            self, plan=self.plan.slice(first, end), rate=self.rate[first:end]
         )
-        return np.array_equal(here, there)
+
+    def before_change(self, raw: Plan) -> "Progress":
+        """Returns the samples before the first one that differs in ``raw``.
+
+        If all do, ``raw`` is another motion, and the result has no source.
+        """
+        if self.source is None or raw is self.source:
+            return self
+        change = first_change(self.source, raw)
+        if self.path_time < change:
+            return self
+        end = int(np.searchsorted(self.plan.path_time, change))
+        return self.slice(0, end) if end else replace(self, source=None)
+
+
+def no_progress(robot: Robot, start_time: float) -> Progress:
+    """Returns the state before the first chunk, which begins at ``start_time``, s."""
+    return Progress(standing_plan(robot, start_time), np.ones(1))
 
 
 def smooth_chunk(
@@ -228,18 +249,18 @@ def smooth_chunk(
         start=start,
         end=end,
         commit=commit,
-        start_rate=progress.rate,
+        start_rate=float(progress.rate[-1]),
     )
     if not begun:
         plan = _follow(robot, raw, window, clock, progress.plan.start_time)
-    elif len(clock.path_time) == 1:
+        return Progress(plan, clock.rate, raw)
+    # The first sample is the last committed one.
+    clock = Clock(clock.path_time[1:], clock.rate[1:])
+    if not len(clock.path_time):
         return None
-    else:
-        # The first sample is the last committed one.
-        clock = Clock(clock.path_time[1:], clock.rate[1:])
-        added = _follow(robot, raw, window, clock, progress.plan.end_time + PLAN_DT)
-        plan = join_plans(progress.plan, added)
-    return Progress(plan, float(clock.path_time[-1]), float(clock.rate[-1]), raw)
+    added = _follow(robot, raw, window, clock, progress.plan.end_time + PLAN_DT)
+    plan = join_plans(progress.plan, added)
+    return Progress(plan, np.concatenate((progress.rate, clock.rate)), raw)
 
 
 def _follow(robot: Robot, raw: Plan, window: slice, clock: Clock, start: float) -> Plan:
@@ -270,7 +291,7 @@ def smooth_plan(
     robot: Robot, raw: Plan, limits: PathLimits, chunk: float = 0.96
 ) -> Plan:
     """Returns all of ``raw``, re-timed chunk by chunk as the system does it."""
-    progress = Progress(standing_plan(robot, raw.start_time))
+    progress = no_progress(robot, raw.start_time)
     while (extended := smooth_chunk(robot, limits, progress, raw, chunk)) is not None:
         progress = extended
     return progress.plan

@@ -139,7 +139,7 @@ def _tail(steered: Steered, first: int) -> Steered:
         for name in ("speed", "rate", "pose", "offset")
     }
     return replace(
-        steered, raw=steered.raw.tail(first), plan=steered.plan.tail(first), **rows
+        steered, raw=steered.raw.slice(first), plan=steered.plan.slice(first), **rows
     )
 
 
@@ -244,28 +244,21 @@ def _foot_offset(
             offset[swing] = old[swing]
             here = max(start, last)
             placed = carried[here] + old[here]
-            angle = turn[here]
-            offset[span] = (
-                placed + rotate(toe[span] - toe[here], angle) - carried[span]
-            )
+            angle = turn[here, None]
+            offset[span] = placed + rotate(toe[span] - toe[here], angle) - carried[span]
         else:
             middle = (start + end) / 2
             if end == len(toe) - 1 and raw.open_ended:
                 middle = max(middle, start + usual / 2)
-            angle = np.interp(middle, np.arange(len(turn)), turn)
-            from_, to = (
-                np.array(
-                    [np.interp(middle, np.arange(len(p)), p[:, i]) for i in (0, 1)]
-                )
-                for p in (raw_pose, pose)
-            )
+            angle = _between(turn[:, None], middle)
+            from_, to = (_between(p[:, :2], middle) for p in (raw_pose, pose))
             offset[span] = to + rotate(toe[span] - from_, angle) - carried[span]
-            there = rotate(slope_toe[start], angle) - slope_carried[start]
+            there = rotate(slope_toe[start], angle[0]) - slope_carried[start]
             offset[begun + 1 : start] = _hermite(
                 offset[begun], slope, offset[start], there, start - begun
             )
         begun, usual = end, end - start
-        slope = rotate(slope_toe[end], angle) - slope_carried[end]
+        slope = rotate(slope_toe[end], angle[0]) - slope_carried[end]
     if begun < len(toe) - 1:
         left = len(toe) - begun
         offset[begun + 1 :] = _hermite(offset[begun], slope, 0 * slope, 0 * slope, left)
@@ -284,7 +277,14 @@ def _hermite(a: Array, slope_a: Array, b: Array, slope_b: Array, steps: int) -> 
     """Returns the inner points of a cubic from ``a`` to ``b``, (steps - 1, 2)."""
     x = (np.arange(1, steps) / steps)[:, None]
     rest = 1 - x
-    return (
-        rest * rest * ((1 + 2 * x) * a + x * steps * slope_a)
-        + x * x * ((1 + 2 * rest) * b - rest * steps * slope_b)
+    return rest * rest * ((1 + 2 * x) * a + x * steps * slope_a) + x * x * (
+        (1 + 2 * rest) * b - rest * steps * slope_b
     )
+
+
+def _between(rows: Array, index: float) -> Array:
+    """Returns the row of (N, D) at a fractional index, by linear interpolation."""
+    low = min(int(index), len(rows) - 1)
+    high = min(low + 1, len(rows) - 1)
+    row: Array = rows[low] + (index - low) * (rows[high] - rows[low])
+    return row

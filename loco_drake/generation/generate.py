@@ -53,7 +53,9 @@ def generate_motions(
     label = schedule.labels[0] if len(schedule.labels) == 1 else SEVERAL
     parts = []
     for chunk in range(-(-count // model.chunk_frames)):
-        labels = np.tile(chunk_labels(model, schedule, chunk), (len(seeds), 1))
+        labels = np.tile(
+            token_labels(model, schedule, chunk * model.chunk_tokens), (len(seeds), 1)
+        )
         stream, frames = model.extend(
             stream, labels, temperature=temperature, top_p=top_p
         )
@@ -92,12 +94,12 @@ def generate_motions(
     ]
 
 
-def chunk_labels(model: MotionModel, schedule: GaitSchedule, chunk: int) -> Integers:
-    """Returns the labels of the tokens of chunk number ``chunk``, (chunk_tokens,).
+def token_labels(model: MotionModel, schedule: GaitSchedule, first: int) -> Integers:
+    """Returns the labels of a chunk from token number ``first`` on, (chunk_tokens,).
 
     A token has the gait that is scheduled at its first frame.
     """
-    tokens = chunk * model.chunk_tokens + np.arange(model.chunk_tokens)
+    tokens = first + np.arange(model.chunk_tokens)
     return schedule.at(tokens * model.frames_per_token / FPS)
 
 

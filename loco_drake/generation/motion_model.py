@@ -167,7 +167,7 @@ class MotionModel:
         self.check_labels(labels)
         new = np.broadcast_to(labels.reshape(batch, -1), (batch, self.chunk_tokens))
         # The first tokens only provide context for the decoder.
-        lead = 0 if stream.chunk else self._lead
+        lead = 0 if stream.chunk else self.lead
         new = np.concatenate((np.repeat(new[:, :1], lead, axis=1), new), axis=1)
         shape = (new.shape[1], self.generator.config.codebooks)
         dice = [uniforms(int(seed), stream.chunk, shape) for seed in stream.seeds]
@@ -190,7 +190,12 @@ class MotionModel:
     ) -> tuple[Stream, Frames]:
         """Decodes tokens (B, n, codebooks), of labels (B, n), that continue ``stream``.
 
-        For an empty stream, the frames of the first ``_lead`` tokens are not returned.
+        For an empty stream, the frames of the first ``lead`` tokens are not returned.
+
+        Args:
+            stream: the stream, which is not modified.
+            tokens: shape (B, n, codebooks).
+            labels: of the tokens, shape (B, n).
         """
         before = stream.tokens.shape[1]
         window = np.concatenate((stream.tokens, tokens), axis=1)
@@ -204,7 +209,7 @@ class MotionModel:
         features = decoded.numpy()[:, seen * self.frames_per_token :]
         footing, q, held = stream.footing, stream.q, stream.contacts[:, None]
         if not stream.chunk:
-            lead = self._lead * self.frames_per_token
+            lead = self.lead * self.frames_per_token
             footing, q, held = self._settle(
                 footing, features[:, lead - SETTLING : lead]
             )
@@ -238,7 +243,8 @@ class MotionModel:
         return after, frames
 
     @property
-    def _lead(self) -> int:
+    def lead(self) -> int:
+        """Tokens at the beginning of a stream that only give context."""
         return max(self.tokenizer.memory, -(-SETTLING // self.frames_per_token))
 
     def _settle(

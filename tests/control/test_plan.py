@@ -120,7 +120,7 @@ def test_samples_are_due_on_the_plans_own_clock(trot):
 
 
 def test_a_plan_cut_in_two_and_joined_is_the_plan(trot):
-    tail = trot.tail(50)
+    tail = trot.slice(50)
     assert tail.start_time == pytest.approx(1.0)
     head = replace(trot, **{n: getattr(trot, n)[:50].copy() for n in _arrays()})
     joined = join_plans(head, tail)

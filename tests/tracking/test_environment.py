@@ -95,7 +95,7 @@ def test_a_step_is_what_the_diagram_does(plans, contact, time_step, tolerance):
     simulator = MakeSimulator(diagram, scenario)
     context = simulator.get_mutable_context()
     diagram.GetInputPort("action").FixValue(context, np.zeros(12))
-    StartEpisode(simulator, plan=replace(plans[0].tail(25), start_time=0.0))
+    StartEpisode(simulator, plan=replace(plans[0].slice(25), start_time=0.0))
     ports = [diagram.GetOutputPort(name) for name in ("observation", "reward_terms")]
     for k, action in enumerate(actions):
         terms = batch.step(np.stack((action, -action)))[0]

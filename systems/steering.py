@@ -1,0 +1,112 @@
+"""The system that makes a plan go where it is told."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import Context
+
+from loco_drake.common.immutable import Immutable
+from loco_drake.control.plan import Plan, first_change, standing_plan
+from loco_drake.control.steering import Steered, begin, steer
+from loco_drake.models.robots import Robot
+
+from .plan_producer import PlanProducer
+from .scenario import SteeringConfig
+
+# A plan that was only extended is steered again from this long before its old end, s:
+# its pace and its last stances were not known yet.
+_UNSURE = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class _Course(Immutable):
+    """The steered plan and the command that it follows."""
+
+    plan: Plan  # as in ``steered``; standing before the first command
+    steered: Steered | None = None  # None before the first command
+    command: tuple[float, ...] = ()
+
+
+class Steering(PlanProducer):
+    """Bends the ground path of a plan until the base moves as commanded.
+
+    .. pydrake_system::
+
+        name: Steering
+        input_ports:
+        - plan: abstract, Plan
+        - command: vector (3,), forward, sideways, yaw rate in H; m/s, rad/s; optional
+        - fixed_time: vector (1,), plan time up to which nothing changes; s; optional
+        output_ports:
+        - plan: abstract, Plan; on the clock of the input
+        - followed: vector (3,), the command as far as it is followed; m/s, rad/s
+
+    H is the base's heading frame. A critically damped filter turns the command into the
+    velocity of the plan, see :mod:`loco_drake.control.steering`. Of a command that legs
+    or joints cannot follow, the largest possible share is followed, which ``followed``
+    tells. Without a command the output is the input itself, and ``followed`` is 0.
+
+    The command is sampled every ``UPDATE_PERIOD`` into the state, of which the outputs
+    are functions. ``fixed_time`` comes from the smoother; without it the Context's time
+    is used.
+
+    Args:
+        robot: the robot.
+        config: response of the filter.
+
+    Raises:
+        InputError: if a number in ``config`` is out of its bounds or, during a
+            simulation, a command is not finite.
+    """
+
+    def __init__(self, robot: Robot, config: SteeringConfig | None = None) -> None:
+        super().__init__()
+        self._robot = robot
+        self._config = config or SteeringConfig()
+        self._config.check()
+        rest = standing_plan(robot)
+        self._plan = self.DeclareAbstractInputPort("plan", Value(rest))
+        self._command = self.DeclareVectorInputPort("command", 3)
+        self._fixed_time = self.DeclareVectorInputPort("fixed_time", 1)
+        self._DeclarePlan(_Course(rest), self._plan.ticket())
+        self.DeclareVectorOutputPort(
+            "followed", 3, self._calc_followed, prerequisites_of_calc={self.xa_ticket()}
+        )
+
+    def _calc_plan(self, context: Context, output: AbstractValue) -> None:
+        course = self._get(context)
+        output.set_value(
+            self._plan.Eval(context) if course.steered is None else course.plan
+        )
+
+    def _calc_followed(self, context: Context, output: Any) -> None:
+        steered = self._get(context).steered
+        output.set_value([0.0] * 3 if steered is None else steered.command)
+
+    def _next(self, context: Context, course: _Course) -> _Course:
+        if not self._command.HasValue(context):
+            return course
+        raw = self._plan.Eval(context)
+        command = self._command.Eval(context)
+        fixed = context.get_time()
+        if self._fixed_time.HasValue(context):
+            fixed = float(self._fixed_time.Eval(context)[0])
+        steered = course.steered
+        if steered is not None:
+            changed = first_change(steered.raw, raw)
+            if changed <= fixed:
+                steered = None  # another motion
+            elif tuple(command) == course.command:
+                if raw is steered.raw:
+                    return course
+                fixed = max(fixed, changed - _UNSURE)
+        steered = steer(
+            self._robot,
+            steered or begin(raw),
+            raw,
+            command,
+            fixed,
+            self._config.response,
+        )
+        return _Course(steered.plan, steered, tuple(command))
