@@ -141,7 +141,7 @@ class ReferenceGenerator(PlanProducer):
         if self._gait.HasValue(context):
             schedule = GaitSchedule((self._label(self._gait.Eval(context)[0]),))
             if schedule != script.schedule:
-                script = self._rewound(script, fixed + UPDATE_PERIOD)
+                script = self._rewound(script, fixed + UPDATE_PERIOD + PLAN_DT)
                 script = replace(script, schedule=schedule)
                 used = min(used, fixed)
         return self._written(script, used, fixed)
