@@ -96,7 +96,8 @@ class Steering(PlanProducer):
         if steered is not None:
             changed = first_change(steered.raw, raw)
             if changed <= fixed:
-                steered = None  # another motion
+                # Another motion, which the smoother plays from its beginning.
+                steered, fixed = None, float(raw.path_time[0])
             elif tuple(command) == course.command:
                 if raw is steered.raw:
                     return course

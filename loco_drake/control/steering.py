@@ -120,7 +120,7 @@ def steer(
     now = natural[last:].mean(axis=0)
     best: tuple[float, Steered] | None = None
     for share in _SHARES:
-        wanted = now + share * (command - now)
+        wanted = command - (1 - share) * (command - now)
         bent, excess = _bend(robot, before, raw, natural, wanted, last, response)
         if best is None or excess < best[0]:
             best = excess, bent

@@ -222,7 +222,8 @@ class MotionModel:
             self.frames_per_token,
             axis=1,
         )
-        keep = max(self.generator.config.window, self.tokenizer.memory)
+        # All new ones, too, from which a caller can go back.
+        keep = max(self.generator.config.window, self.tokenizer.memory, tokens.shape[1])
         after = replace(
             stream,
             chunk=stream.chunk + 1,

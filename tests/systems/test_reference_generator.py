@@ -77,17 +77,27 @@ def test_it_waits_for_a_smoother_that_is_slow(generator):
     assert plan_at(generator, context) is before
 
 
-def test_a_new_gait_holds_from_the_next_chunk_on(generator):
+def test_a_new_gait_holds_from_the_next_token_on(generator, model):
     simulator = Simulator(generator)
     context = simulator.get_mutable_context()
     port = generator.GetInputPort("gait").FixValue(context, float(TROT))
     simulator.AdvanceTo(1.0)
-    written = len(plan_at(generator, context))
+    before = plan_at(generator, context)
     port.GetMutableData().get_mutable_value().set_value([float(PACE)])
+    simulator.AdvanceTo(1.06)  # the update is at 1.04 s
+    after = plan_at(generator, context)
+    first = int(np.argmax(after.labels == PACE))
+    assert (after.labels[:first] == TROT).all()
+    assert (after.labels[first:] == PACE).all()
+    late = after.start_time + first * PLAN_DT - 1.04
+    assert 0.1 <= late <= 0.1 + (model.frames_per_token + 1) * PLAN_DT
+    # A frame belongs to the token whose features it comes from, one frame earlier.
+    np.testing.assert_array_equal(after.q[: first - 1], before.q[: first - 1])
     simulator.AdvanceTo(2.0)
-    labels = plan_at(generator, context).labels
-    assert (labels[:written] == TROT).all()
-    assert (labels[written + 1 :] == PACE).all()
+    np.testing.assert_array_equal(plan_at(generator, context).q[: len(after)], after.q)
+    v = plan_at(generator, context).v[1:-1, 3:]
+    q = plan_at(generator, context).q[:, 4:]
+    np.testing.assert_allclose(v, (q[2:] - q[:-2]) / (2 * PLAN_DT), atol=1e-6)
 
 
 def test_a_schedule_is_kept_to_a_token(go2, model):

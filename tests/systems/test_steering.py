@@ -1,0 +1,241 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from loco_drake.common.errors import InputError
+from loco_drake.control.ground_path import ground_pose, path_velocity
+from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD, plan_from_motion
+from loco_drake.control.retiming import PathLimits, path_limits
+from loco_drake.systems.control import PlanPlayer
+from loco_drake.systems.reference_generator import ReferenceGenerator
+from loco_drake.systems.scenario import GeneratedReference, SteeringConfig
+from loco_drake.systems.steering import Steering
+from loco_drake.systems.toppra_smoother import ToppraSmoother
+from tests.synthetic_motion import synthetic_motion
+from tests.tiny_model import make_tiny_model
+
+STEP = 1.3  # s, when commands change
+
+
+def add(builder, name, system, plan):
+    builder.AddNamedSystem(name, system)
+    builder.Connect(plan, system.GetInputPort("plan"))
+    return system
+
+
+def build(robot, reference, limits=None, steering=True):
+    """A reference, steering and a smoother, connected as in a locomotion diagram."""
+    builder = DiagramBuilder()
+    builder.AddNamedSystem("reference", reference)
+    chain = [reference]
+    if steering:
+        system = Steering(robot)
+        chain.append(add(builder, "steering", system, reference.GetOutputPort("plan")))
+        builder.ExportInput(system.GetInputPort("command"), "command")
+        builder.ExportOutput(system.GetOutputPort("followed"), "followed")
+    smoother = ToppraSmoother(robot, limits=limits)
+    add(builder, "smoother", smoother, chain[-1].GetOutputPort("plan"))
+    for system in chain:
+        for name in ("path_time", "fixed_time"):
+            if system.HasInputPort(name):
+                builder.Connect(smoother.GetOutputPort(name), system.GetInputPort(name))
+    if reference.HasInputPort("gait"):
+        builder.ExportInput(reference.GetInputPort("gait"), "gait")
+    builder.ExportOutput(smoother.GetOutputPort("plan"), "plan")
+    return builder.Build()
+
+
+@pytest.fixture(scope="module")
+def model():
+    return make_tiny_model()
+
+
+@pytest.fixture(scope="module")
+def long_trot(go2):
+    return plan_from_motion(go2, synthetic_motion("dog-trot", 12.0, 0.7))
+
+
+@pytest.fixture(scope="module")
+def played(go2, long_trot):
+    return build(go2, PlanPlayer(go2, long_trot))
+
+
+def sample_of(diagram, context, time):
+    plan = diagram.GetOutputPort("plan").Eval(context)
+    return plan.q[round((time - plan.start_time) / PLAN_DT)]
+
+
+def run(diagram, commands, end, context=None, gaits=()):
+    """Plays; returns q of each sample when it is due, and the plans at each update."""
+    simulator = Simulator(diagram, context)
+    context = simulator.get_mutable_context()
+    q, plans = [], []
+    begin = round(context.get_time() / PLAN_DT)
+    for k in range(begin, round(end / PLAN_DT)):
+        for name, table in (("command", commands), ("gait", gaits)):
+            due = [value for time, value in table if time <= k * PLAN_DT + 1e-9]
+            if due:
+                diagram.GetInputPort(name).FixValue(context, np.atleast_1d(due[-1]))
+        simulator.AdvanceTo(k * PLAN_DT)
+        q.append(sample_of(diagram, context, k * PLAN_DT))
+        plans.append(diagram.GetOutputPort("plan").Eval(context))
+    return np.array(q), plans
+
+
+def test_without_a_command_the_plan_itself_passes(go2, long_trot):
+    """The same object: not a bit of it can differ."""
+    builder = DiagramBuilder()
+    player = builder.AddNamedSystem("player", PlanPlayer(go2, long_trot))
+    steering = add(builder, "steering", Steering(go2), player.GetOutputPort("plan"))
+    diagram = builder.Build()
+    simulator = Simulator(diagram)
+    simulator.AdvanceTo(1.0)
+    context = steering.GetMyContextFromRoot(simulator.get_context())
+    assert steering.GetOutputPort("plan").Eval(context) is long_trot
+    np.testing.assert_array_equal(steering.GetOutputPort("followed").Eval(context), 0)
+
+
+def test_without_a_command_generated_motion_is_as_without_steering(go2, model):
+    runs = []
+    for steering in (True, False):
+        reference = ReferenceGenerator(go2, GeneratedReference(), model)
+        runs.append(run(build(go2, reference, steering=steering), [], 4.0)[0])
+    np.testing.assert_array_equal(*runs)
+
+
+def test_the_plan_follows_a_step_of_the_command_within_a_second(played):
+    commands = [(0.0, [0.7, 0.0, 0.0]), (STEP, [0.3, 0.1, 0.8])]
+    q, _ = run(played, commands, 4.0)
+    velocity = path_velocity(ground_pose(q))
+    before, after = slice(40, 60), slice(round((STEP + 1.0) / PLAN_DT), None)
+    np.testing.assert_allclose(velocity[before].mean(axis=0), [0.7, 0, 0], atol=0.03)
+    np.testing.assert_allclose(velocity[after].mean(axis=0), [0.3, 0.1, 0.8], atol=0.03)
+
+
+@pytest.mark.parametrize("slow", [False, True])
+def test_the_first_sample_that_differs_is_due_within_three_tenths(go2, long_trot, slow):
+    """Also while TOPP-RA is slowing the plan."""
+    limits = path_limits(go2)
+    if slow:
+        acceleration = limits.acceleration.copy()
+        acceleration[:12] *= 0.08
+        limits = PathLimits(limits.speed, acceleration)
+    diagram = build(go2, PlanPlayer(go2, long_trot), limits)
+    ours, plans = run(diagram, [(0.0, [0.6, 0.0, 0.0])], 2.5)
+    if slow:
+        assert plans[-1].path_time[-1] - plans[-1].path_time[0] < 0.97 * (
+            plans[-1].end_time - plans[-1].start_time
+        )
+    # At any phase of the updates.
+    for late in range(4):
+        time = STEP + late * PLAN_DT
+        commands = [(0.0, [0.6, 0.0, 0.0]), (time, [0.0, 0.0, 0.0])]
+        theirs, _ = run(diagram, commands, 2.5)
+        first = np.flatnonzero((ours != theirs).any(axis=1))[0] * PLAN_DT
+        assert time + UPDATE_PERIOD <= first <= time + 0.3
+
+
+def test_nothing_that_is_fixed_changes(played):
+    """Each plan agrees with the one before as far as the next two updates."""
+    commands = [(0.24 * k, [0.3 * (k % 3), 0.0, (-1.0) ** k]) for k in range(12)]
+    _, plans = run(played, commands, 3.0)
+    ahead = round(UPDATE_PERIOD / PLAN_DT)
+    for k, (old, new) in enumerate(pairwise(plans)):
+        here, there = (round(k - p.start_time / PLAN_DT) for p in (old, new))
+        np.testing.assert_array_equal(
+            old.q[here : here + ahead], new.q[there : there + ahead]
+        )
+
+
+def test_what_is_played_is_smooth(played, long_trot):
+    commands = [(0.24 * k, [0.3 * (k % 3), 0.0, (-1.0) ** k]) for k in range(12)]
+    q, _ = run(played, commands, 3.0)
+    steps = np.abs(np.diff(q[:, 7:], axis=0)).max()
+    assert steps < 2.5 * np.abs(np.diff(long_trot.q[:, 7:], axis=0)).max()
+    jolt = np.abs(np.diff(q[:, 4:7], n=2, axis=0)).max() / PLAN_DT**2
+    assert jolt < 25.0  # m/s^2; a change of .6 m/s within .6 s
+
+
+def test_another_gait_is_written_from_the_next_tokens_on(go2, model):
+    pace = GeneratedReference(gait="dog-pace")
+    diagram = build(go2, ReferenceGenerator(go2, pace, model))
+    q, plans = run(diagram, [], 3.0, gaits=[(0.0, 0.0), (STEP, 1.0)])
+    labels = np.array(
+        [p.labels[round(k - p.start_time * 50)] for k, p in enumerate(plans)]
+    )
+    first = np.flatnonzero(labels == 1)[0] * PLAN_DT
+    # Three updates, one token of .08 s and a frame.
+    assert STEP + 0.2 < first <= STEP + 0.45
+    assert (labels[round(first / PLAN_DT) :] == 1).all()
+    # It is the same motion up to there, and goes on without a jump.
+    same, _ = run(diagram, [], 3.0, gaits=[(0.0, 0.0)])
+    differs = np.flatnonzero((q != same).any(axis=1))[0] * PLAN_DT
+    assert differs >= STEP + 0.2
+    step = np.abs(np.diff(q[:, 4:], axis=0)).max(axis=1)
+    around = slice(round(STEP / PLAN_DT), round((STEP + 0.6) / PLAN_DT))
+    assert step[around].max() <= 1.5 * step.max()
+
+
+@pytest.mark.parametrize("at", [STEP + 0.02, STEP + 0.11, STEP + 0.3])
+def test_a_clone_in_the_middle_of_a_turn_goes_on_identically(go2, model, at):
+    diagram = build(go2, ReferenceGenerator(go2, GeneratedReference(), model))
+    commands = [(0.0, [0.4, 0.0, 0.0]), (STEP, [0.4, 0.0, 0.9])]
+    gaits = [(0.0, 0.0), (STEP, 1.0)]
+    context = diagram.CreateDefaultContext()
+    run(diagram, commands, at, context, gaits)
+    clone = context.Clone()
+    ours, _ = run(diagram, commands, 4.0, context, gaits)
+    theirs, _ = run(diagram, commands, 4.0, clone, gaits)
+    np.testing.assert_array_equal(ours, theirs)
+
+
+def test_a_reset_context_repeats_a_drive(played):
+    commands = [(0.0, [0.5, 0.1, 0.0]), (STEP, [0.2, 0.0, 0.9])]
+    context = played.CreateDefaultContext()
+    first, _ = run(played, commands, 3.0, context)
+    played.SetDefaultContext(context)
+    context.SetTime(0.0)
+    again, _ = run(played, commands, 3.0, context)
+    np.testing.assert_array_equal(first, again)
+
+
+def test_another_plan_is_steered_from_its_beginning(go2, long_trot):
+    """A player that gets another plan plays it at once, steered as before."""
+    player = PlanPlayer(go2, long_trot)
+    diagram = build(go2, player)
+    simulator = Simulator(diagram)
+    context = simulator.get_mutable_context()
+    diagram.GetInputPort("command").FixValue(context, [0.4, 0.0, 0.5])
+    simulator.AdvanceTo(2.0)
+    pace = plan_from_motion(go2, synthetic_motion("dog-pace", 6.0, 0.9), 2.0)
+    player.SetPlan(player.GetMyMutableContextFromRoot(context), pace)
+    simulator.AdvanceTo(4.5)
+    plan = diagram.GetOutputPort("plan").Eval(context)
+    assert (plan.labels[plan.index(4.0) :] == pace.labels[0]).all()
+    velocity = path_velocity(ground_pose(plan.q))[plan.index(3.8) : plan.index(4.5)]
+    np.testing.assert_allclose(velocity.mean(axis=0), [0.4, 0.0, 0.5], atol=0.05)
+
+
+def test_the_port_tells_what_is_followed(played):
+    simulator = Simulator(played)
+    context = simulator.get_mutable_context()
+    port = played.GetInputPort("command").FixValue(context, [0.5, 0.0, 0.4])
+    simulator.AdvanceTo(0.5)
+    followed = played.GetOutputPort("followed")
+    np.testing.assert_allclose(followed.Eval(context), [0.5, 0.0, 0.4])
+    port.GetMutableData().get_mutable_value().set_value([9.0, 0.0, 0.4])
+    simulator.AdvanceTo(1.0)
+    assert 0.7 < followed.Eval(context)[0] < 4.0
+
+
+def test_bad_input_is_refused(go2, played):
+    with pytest.raises(InputError, match="response must be a number"):
+        Steering(go2, SteeringConfig(response=0.0))
+    simulator = Simulator(played)
+    context = simulator.get_mutable_context()
+    played.GetInputPort("command").FixValue(context, [0.5, np.nan, 0.4])
+    with pytest.raises(InputError, match="three finite numbers"):
+        simulator.AdvanceTo(0.5)
