@@ -56,7 +56,7 @@ def test_architecture_names_every_system_and_port_of_the_diagram():
     ports = [
         diagram.get_output_port(i).get_name() for i in range(diagram.num_output_ports())
     ]
-    assert sorted(ports) == sorted(re.findall(r" p\d\(\[(\w+)\]\)", page))
+    assert sorted(ports) == sorted(re.findall(r" p\d+\(\[(\w+)\]\)", page))
 
 
 @pytest.mark.parametrize(

@@ -1,18 +1,19 @@
 """The files of the recordings: where each is published, and its way into a folder."""
 
 import csv
-import hashlib
 import io
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from urllib.parse import quote
 
+import pooch
 import requests
 
 from loco_drake.common.errors import InputError
-from loco_drake.common.files import atomic_path, is_inside, read_text
+from loco_drake.common.files import is_inside, read_text
 from loco_drake.datasets.registry import DATASETS
 
 MANIFEST = Path(__file__).with_name("manifest.csv")
@@ -26,7 +27,8 @@ _COLUMNS = {
 # Without a connection every file would wait for its timeout: so many in a row suffice.
 LOST_CONNECTIONS = 3
 _CHUNK = 2**16
-_TIMEOUT = 30.0  # s
+
+pooch.get_logger().setLevel("ERROR")
 
 
 @dataclass(frozen=True)
@@ -41,10 +43,11 @@ class RemoteFile:
     def is_present(self, folder: Path) -> bool:
         """Says whether the data folder has the file with the right content."""
         path = folder / self.name
-        if not path.is_file() or path.stat().st_size != self.size:
-            return False
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest() == self.sha256
+        return (
+            path.is_file()
+            and path.stat().st_size == self.size
+            and pooch.file_hash(str(path)) == self.sha256
+        )
 
 
 def read_manifest(path: Path) -> list[RemoteFile]:
@@ -109,7 +112,7 @@ def parse_mirror(text: str | None) -> str | Path | None:
 
 
 def download_files(
-    files: Iterable[RemoteFile],
+    files: Sequence[RemoteFile],
     folder: Path,
     mirror: str | Path | None = None,
     report: Callable[[int], object] = lambda done: None,
@@ -132,22 +135,31 @@ def download_files(
     Raises:
         OSError: if the data folder cannot be written to.
     """
+    urls = {
+        file.name: file.url
+        if mirror is None
+        else f"{mirror}/{quote(file.name) if isinstance(mirror, str) else file.name}"
+        for file in files
+    }
+    hashes = {file.name: file.sha256 for file in files}
+    keeper = pooch.create(path=folder, base_url="", registry=hashes, urls=urls)
+    fetch = _copy if isinstance(mirror, Path) else _get
     done = lost = 0
     for file in files:
         error: str | None = "was not tried, for want of a connection"
         if lost < LOST_CONNECTIONS:
-            if isinstance(mirror, Path):
-                chunks = _copy(mirror / file.name, file.size)
-            else:
-                chunks = _get(f"{mirror}/{quote(file.name)}" if mirror else file.url)
+            meter = _Meter(file.size, done, report)
             try:
-                for count in _write(chunks, file, folder):
-                    report(done + count)
+                if not (folder / file.name).resolve().is_relative_to(folder.resolve()):
+                    raise _DownloadError("is led out of the data folder by a link")
+                keeper.fetch(file.name, downloader=partial(fetch, meter=meter))
                 lost, error = 0, None
             except _ConnectionLostError as failed:
                 lost, error = lost + 1, str(failed)
             except _DownloadError as failed:
                 lost, error = 0, str(failed)
+            except ValueError:  # of pooch
+                lost, error = 0, "has another SHA-256 than the manifest says"
         yield file, error
         done += file.size
         report(done)
@@ -161,41 +173,24 @@ class _ConnectionLostError(_DownloadError):
     """The server cannot be reached, so that other files will fare no better."""
 
 
-def _write(chunks: Iterable[bytes], file: RemoteFile, folder: Path) -> Iterator[int]:
-    """Writes a file of the data folder, and yields how many bytes have arrived."""
-    path = folder / file.name
-    if not path.resolve().is_relative_to(folder.resolve()):
-        raise _DownloadError("is led out of the data folder by a link")
-    count, digest = 0, hashlib.sha256()
-    with atomic_path(path) as temporary, temporary.open("wb") as target:
-        for chunk in chunks:
-            count += len(chunk)
-            if count > file.size:
-                raise _DownloadError("is longer than the manifest says")
-            digest.update(chunk)
-            target.write(chunk)
-            yield count
-        if digest.hexdigest() != file.sha256:
-            raise _DownloadError("has another SHA-256 than the manifest says")
-
-
-def _copy(path: Path, size: int) -> Iterator[bytes]:
+def _copy(source: str, target: str, _: object, *, meter: "_Meter") -> None:
     try:
-        if path.stat().st_size != size:
+        if Path(source).stat().st_size != meter.size:
             raise _DownloadError("has another size than the manifest says")
-        content = path.read_bytes()
+        content = Path(source).read_bytes()
     except OSError as error:
         reason = f"cannot be read from the mirror: {error.strerror}"
         raise _DownloadError(reason) from None
-    yield content
+    _renew(target).write_bytes(content)
 
 
-def _get(url: str) -> Iterator[bytes]:
+def _get(url: str, target: str, _: object, *, meter: "_Meter") -> None:
+    download = pooch.HTTPDownloader(progressbar=meter, chunk_size=_CHUNK)
     try:
-        with requests.get(url, stream=True, timeout=_TIMEOUT) as response:
-            response.raise_for_status()
-            yield from response.iter_content(_CHUNK)
+        download(url, str(_renew(target)), None)
     except requests.HTTPError as error:
+        if error.response is not None:
+            error.response.close()  # nobody reads its body
         status = str(error).split(" for url")[0]
         raise _DownloadError(f"was refused by the server: {status}") from None
     except requests.exceptions.ChunkedEncodingError:
@@ -204,3 +199,30 @@ def _get(url: str) -> Iterator[bytes]:
         raise _ConnectionLostError("found no connection to the server") from None
     except requests.RequestException as error:
         raise _DownloadError(f"cannot be fetched: {error}") from None
+
+
+def _renew(temporary: str) -> Path:
+    """Removes pooch's temporary file: it is private, a new one follows the umask."""
+    Path(temporary).unlink()
+    return Path(temporary)
+
+
+class _Meter:
+    """What pooch takes for a progress bar: reports bytes over all files."""
+
+    def __init__(self, size: int, before: int, report: Callable[[int], object]) -> None:
+        self.size = self.total = size
+        self._before, self._done, self._report = before, 0, report
+
+    def update(self, count: int) -> None:
+        self._done += count
+        # Pooch counts whole chunks, also for the last one, which is shorter.
+        if self._done > self.size + _CHUNK:
+            raise _DownloadError("is longer than the manifest says")
+        self._report(self._before + min(self._done, self.size))
+
+    def reset(self) -> None:
+        self._done = 0
+
+    def close(self) -> None:
+        pass
