@@ -9,7 +9,6 @@ graph, and in a parameter of the systems :class:`Actuation`, :class:`Pushes` and
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.common.value import Value
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
@@ -22,6 +21,7 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.control.domain import MAX_LATENCY, Domain, draw_error, measure
 from loco_drake.control.plan import PLAN_DT
@@ -37,8 +37,6 @@ from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import Robot
 
 from .control import FindRobot
-
-Array = NDArray[np.float64]
 
 DISTURBING_SYSTEMS = ("actuation", "pushes", "sensors")
 _TOLERANCE = 1e-6  # s, or of a sample; context times are sums of steps

@@ -3,8 +3,8 @@
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import quat_conjugate, quat_rotate
 from loco_drake.control.plan import Plan
 from loco_drake.control.state import (
@@ -14,8 +14,6 @@ from loco_drake.control.state import (
     VELOCITY,
 )
 from loco_drake.models.robots import Robot
-
-Array = NDArray[np.float64]
 
 ACTION_SCALE = 0.15  # rad per unit of action: 15 Nm on both robots
 GRAVITY = 9.81  # m/s^2

@@ -16,6 +16,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from loco_drake.common.arrays import Array, Integers
 from loco_drake.common.errors import InputError
 from loco_drake.common.weights import (
     build_network,
@@ -40,7 +41,7 @@ OBSERVATION_CLIP = 5.0  # standard deviations
 # Parts of the observation that need the base's position in the world or its velocity.
 PRIVILEGED = ("v_WB_H", "height", "plan_p_H")
 
-Values = TypeVar("Values", NDArray[np.float64], NDArray[np.float32], Tensor)
+Values = TypeVar("Values", Array, NDArray[np.float32], Tensor)
 
 # Permutation and signs that mirror a part of the observation; parts may repeat them.
 _KEEP = ([0], [1.0])
@@ -70,7 +71,7 @@ _MIRRORS = {
 class _Mirror:
     """Mirrors arrays and tensors by permuting the last axis and changing signs."""
 
-    def __init__(self, order: NDArray[np.int64], signs: NDArray[np.float64]) -> None:
+    def __init__(self, order: Integers, signs: Array) -> None:
         self._order, self._signs = order, signs
         self._signs_torch = torch.tensor(signs, dtype=torch.float32)
 

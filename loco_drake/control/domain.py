@@ -9,8 +9,8 @@ from math import inf
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, check_number
 from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import quat_exp, quat_multiply, quat_rotate
@@ -24,8 +24,6 @@ from loco_drake.control.state import (
     split,
 )
 from loco_drake.models.parameters import LEAST_PAYLOAD
-
-Array = NDArray[np.float64]
 
 MAX_LATENCY = 0.1  # s
 # Name and size of each part of a sensor error, in order.

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array, Bools, Integers
 from loco_drake.common.rotations import (
     heading_matrix,
     quat_conjugate,
@@ -25,8 +25,6 @@ from loco_drake.control.state import (
 )
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import ONE_HOT, ONE_HOT_SIZE
-
-Array = NDArray[np.float64]
 
 # Samples of the plan, counted from the current one, that the policy observes.
 LOOK_AHEAD = np.array([1, 2, 4, 8])
@@ -60,8 +58,8 @@ class Preview:
 
     q: Array  # positions as in Plan, shape (..., K, 19)
     v: Array  # velocities as in Plan, shape (..., K, 18)
-    contacts: NDArray[np.bool_]  # shape (..., K, 4)
-    label: NDArray[np.int64]  # row of motion.gaits.ONE_HOT of the present, shape (...)
+    contacts: Bools  # shape (..., K, 4)
+    label: Integers  # row of motion.gaits.ONE_HOT of the present, shape (...)
 
 
 def preview(plan: Plan, time: float) -> Preview:

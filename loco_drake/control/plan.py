@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array, Bools, Integers
 from loco_drake.common.errors import InputError
 from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import quat_conjugate, quat_rotate, yaw_of, yaw_quat
@@ -14,8 +15,6 @@ from loco_drake.control.state import JOINTS, ORIENTATION, POSITION, unit_base
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.motion.motion import FPS, Motion
-
-Array = NDArray[np.float64]
 
 PLAN_DT = 1.0 / FPS
 # Update period in s of systems that output plans. As a power of two times PLAN_DT, it
@@ -46,8 +45,8 @@ class Plan(Immutable):
     vdot: Array  # time derivatives of v, shape (N, 6 + J)
     p_WF: Array  # centres of the toe spheres in m, shape (N, 4, 3)
     # Whether each foot should be on the ground, shape (N, 4).
-    contacts: NDArray[np.bool_]
-    labels: NDArray[np.int64]  # row of motion.gaits.ONE_HOT, shape (N,)
+    contacts: Bools
+    labels: Integers  # row of motion.gaits.ONE_HOT, shape (N,)
     # Time in the motion before smoothing, s, shape (N,); the smoother slows this clock
     # down where the robot could not keep up.
     path_time: Array
@@ -141,8 +140,8 @@ def make_plan(
     *,
     q: Array,
     v: Array,
-    contacts: NDArray[np.bool_],
-    labels: NDArray[np.int64],
+    contacts: Bools,
+    labels: Integers,
     start_time: float = 0.0,
     path_time: Array | None = None,
     open_ended: bool = False,

@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import toppra
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 from toppra.interpolator import AbstractGeometricPath
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import quat_continuous
 from loco_drake.control.action import GRAVITY
@@ -23,8 +23,6 @@ from loco_drake.control.plan import (
 )
 from loco_drake.control.state import HEIGHT, JOINTS, ORIENTATION
 from loco_drake.models.robots import Robot
-
-Array = NDArray[np.float64]
 
 # toppra logs infeasible problems as errors; here they are results.
 toppra.setup_logging("ERROR")

@@ -1,8 +1,8 @@
 """The reward for tracking a plan, per step."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import heading_matrix, quat_error, quat_to_matrix
 from loco_drake.control.state import (
     ANGULAR_VELOCITY,
@@ -14,8 +14,6 @@ from loco_drake.control.state import (
     split,
 )
 from loco_drake.models.robots import Robot
-
-Array = NDArray[np.float64]
 
 # Terms and weights of Peng et al. 2020, "Learning agile robotic locomotion skills by
 # imitating animals", Section IV-B.

@@ -1,4 +1,4 @@
-"""The state [q, v] of a robot: its parts, its unit quaternion, and fall detection.
+"""The state [q, v] of a robot: its parts, its unit quaternion, and when it is lost.
 
 The order is the plant's: q = [q_WB as w x y z, p_WB, joints], of size 7 + J, and v =
 [w_WB_W, v_WB_W, joint velocities], of size 6 + J. Unlike Drake's namedview,
@@ -6,14 +6,14 @@ The order is the plant's: q = [q_WB as w x y z, p_WB, joints], of size 7 + J, an
 """
 
 import itertools
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array, Bools
+from loco_drake.common.errors import check_bounds
 from loco_drake.common.rotations import quat_to_matrix
 from loco_drake.models.robots import Robot
-
-Array = NDArray[np.float64]
 
 # Of q.
 ORIENTATION = np.s_[..., :4]
@@ -25,9 +25,8 @@ ANGULAR_VELOCITY = np.s_[..., :3]
 VELOCITY = np.s_[..., 3:6]
 JOINT_VELOCITIES = np.s_[..., 6:]
 
-_ROUNDING = (
-    1e-14  # what dividing a quaternion by its length leaves of the square's error
-)
+# What dividing a quaternion by its length leaves of the square's error.
+_ROUNDING = 1e-14
 # A robot that tilts further does not recover.
 _MAX_TILT = np.deg2rad(60.0)
 _CORNERS = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
@@ -59,7 +58,7 @@ def unit_base(state: Array) -> Array:
     return result
 
 
-def has_fallen(robot: Robot, q: Array, R_WB: Array | None = None) -> NDArray[np.bool_]:
+def has_fallen(robot: Robot, q: Array, R_WB: Array | None = None) -> Bools:
     """Returns whether the trunk touches the ground or tilts by more than 60 degrees.
 
     Args:
@@ -76,3 +75,40 @@ def has_fallen(robot: Robot, q: Array, R_WB: Array | None = None) -> NDArray[np.
     z_B = R_WB[..., 2, :]
     lowest = q[..., HEIGHT] + (z_B @ (_CORNERS * robot.trunk_size).T).min(axis=-1)
     return (lowest <= 0) | (z_B[..., 2] < np.cos(_MAX_TILT))
+
+
+@dataclass(kw_only=True)
+class TerminationConfig:
+    """Distance from the plan at which an episode ends.
+
+    The joints alone cannot detect a robot that stands still while its plan moves on, so
+    errors of the base terminate episodes as well (Bogdanovic et al. 2022 and others).
+    """
+
+    # Distance between the base and the plan's base, m.
+    position: float = 0.35
+    # Angle between the base and the plan's base, rad.
+    rotation: float = 0.8
+
+    def check(self) -> None:
+        """Raises InputError unless both are above 0."""
+        for name, value in vars(self).items():
+            # Infinity never terminates.
+            if value != np.inf:
+                check_bounds(f"The termination's {name}", value, 0, above=True)
+
+    def exceeded(self, state: Array, plan_state: Array) -> Bools:
+        """Returns whether each robot is too far from its plan to come back, (...).
+
+        Args:
+            state: the plant's [q, v], shape (..., 37).
+            plan_state: the same of the plan.
+        """
+        gap = np.linalg.norm(state[POSITION] - plan_state[POSITION], axis=-1)
+        # A turn by an angle a takes a unit quaternion to one whose product with it is
+        # cos(a / 2), up to its sign.
+        product = np.einsum(
+            "...i,...i->...", state[ORIENTATION], plan_state[ORIENTATION]
+        )
+        turn = 2 * np.arccos(np.minimum(np.abs(product), 1.0))
+        return (gap > self.position) | (turn > self.rotation)

@@ -12,8 +12,8 @@ from itertools import permutations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, quoted
 from loco_drake.common.rotations import (
     angular_velocity,
@@ -25,8 +25,6 @@ from loco_drake.models.legs import LEGS, MIRROR_JOINT_SIGNS, MIRROR_POLAR
 from loco_drake.models.robots import ROBOTS, Robot, get_robot
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.quality import toe_trajectories
-
-Array = NDArray[np.float64]
 
 MIN_FRAMES = 3  # needed for velocities
 MAX_DISTANCE = 1e4  # m from the world's origin

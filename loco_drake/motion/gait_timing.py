@@ -20,16 +20,14 @@ the trunk's heading.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import yaw_of
 from loco_drake.models.legs import LEGS
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.quality import toe_trajectories
-
-Array = NDArray[np.float64]
 
 _REFERENCE_LEG = LEGS.index("RL")
 MIN_STRIDES = 3

@@ -5,8 +5,9 @@ from itertools import pairwise
 from math import isfinite, nan
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from loco_drake.common.arrays import Integers
 from loco_drake.common.errors import InputError, check_choice, check_name
 
 # Sources and gaits with an input of their own in the shipped networks. Others are valid
@@ -106,7 +107,7 @@ class GaitSchedule:
         later = zip(self.labels[1:], self.starts[1:], strict=True)
         return ",".join([str(self.labels[0]), *(f"{k}@{t:g}" for k, t in later)])
 
-    def at(self, times: ArrayLike) -> NDArray[np.int64]:
+    def at(self, times: ArrayLike) -> Integers:
         """Returns the index into LABELS at each of ``times`` (N,), s."""
         place = np.searchsorted(self.starts, times, side="right") - 1
         return np.array([label.index for label in self.labels])[place]

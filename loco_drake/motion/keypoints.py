@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.models.legs import MIRROR_LEGS, MIRROR_POLAR
 from loco_drake.motion.gaits import GaitLabel
@@ -21,9 +21,9 @@ class KeypointClip:
     source: str  # name of the animal or robot, such as dog; need not be a known one
     gait: str  # need not be one of the fifteen labels
     fps: float  # frames per second, the source's own rate
-    withers: NDArray[np.float64]  # shape (T, 3)
-    hip: NDArray[np.float64]  # top of the pelvis, shape (T, 3)
-    toes: NDArray[np.float64]  # legs FL, FR, RL, RR, shape (T, 4, 3)
+    withers: Array  # shape (T, 3)
+    hip: Array  # top of the pelvis, shape (T, 3)
+    toes: Array  # legs FL, FR, RL, RR, shape (T, 4, 3)
     provenance: dict[str, str]  # origin as text: file, frames, licence, ...
 
     def __post_init__(self) -> None:

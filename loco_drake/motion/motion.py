@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array, Bools, Integers
 from loco_drake.common.errors import InputError, check_name
 from loco_drake.common.rotations import angular_velocity, quat_continuous
 from loco_drake.models.legs import (
@@ -44,13 +44,13 @@ class Motion:
     gait: str
     fps: float  # frames per second
     joint_names: tuple[str, ...]  # of the J joints
-    base_position: NDArray[np.float64]  # p_WB in m, shape (T, 3)
-    base_quaternion: NDArray[np.float64]  # R_WB as unit w x y z, shape (T, 4)
-    joint_positions: NDArray[np.float64]  # rad, shape (T, J)
-    base_velocity: NDArray[np.float64]  # v_WB_W in m/s, shape (T, 3)
-    base_angular_velocity: NDArray[np.float64]  # w_WB_W in rad/s, shape (T, 3)
-    joint_velocities: NDArray[np.float64]  # rad/s, shape (T, J)
-    contacts: NDArray[np.bool_]  # whether each foot is on the ground, shape (T, 4)
+    base_position: Array  # p_WB in m, shape (T, 3)
+    base_quaternion: Array  # R_WB as unit w x y z, shape (T, 4)
+    joint_positions: Array  # rad, shape (T, J)
+    base_velocity: Array  # v_WB_W in m/s, shape (T, 3)
+    base_angular_velocity: Array  # w_WB_W in rad/s, shape (T, 3)
+    joint_velocities: Array  # rad/s, shape (T, J)
+    contacts: Bools  # whether each foot is on the ground, shape (T, 4)
     provenance: dict[str, str] = field(default_factory=dict)  # origin as text
     # First frame, from 0, and label of each gait; empty if there is only one.
     gait_changes: tuple[tuple[int, GaitLabel], ...] = ()
@@ -102,7 +102,7 @@ class Motion:
         return (len(self) - 1) / self.fps
 
     @property
-    def label_indices(self) -> NDArray[np.int64]:
+    def label_indices(self) -> Integers:
         """Row of :data:`loco_drake.motion.gaits.ONE_HOT` of each frame, shape (T,)."""
         changes = self.gait_changes or ((0, self.label),)
         starts, labels = zip(*changes, strict=True)
@@ -128,7 +128,7 @@ class Motion:
                 f"mirrored, not {len(self.joint_names)}; mirror it when retargeting."
             )
 
-        def joints(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        def joints(values: Array) -> Array:
             return values[:, MIRROR_JOINTS] * MIRROR_JOINT_SIGNS
 
         return replace(
@@ -149,10 +149,10 @@ def make_motion(
     robot: str,
     label: GaitLabel,
     joint_names: tuple[str, ...],
-    base_position: NDArray[np.float64],
-    base_quaternion: NDArray[np.float64],
-    joint_positions: NDArray[np.float64],
-    contacts: NDArray[np.bool_],
+    base_position: Array,
+    base_quaternion: Array,
+    joint_positions: Array,
+    contacts: Bools,
     provenance: dict[str, str],
     fps: float = FPS,
 ) -> Motion:

@@ -5,13 +5,11 @@ from contact labels, so they are comparable for motion of any origin.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import quat_rotate
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion.motion import Motion
-
-Array = NDArray[np.float64]
 
 # A toe sphere with its lowest point this near to the ground is in stance, m.
 STANCE_HEIGHT = 0.010

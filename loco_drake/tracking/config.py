@@ -9,46 +9,20 @@ from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError, check_at_least, check_bounds
 from loco_drake.common.rotations import quat_multiply, quat_rotate, yaw_quat
+from loco_drake.control.state import (
+    ANGULAR_VELOCITY,
+    JOINTS,
+    ORIENTATION,
+    POSITION,
+    VELOCITY,
+    TerminationConfig,
+    split,
+)
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.tracking.randomization import RandomizationConfig
 
 Array = NDArray[np.float64]
-
-
-@dataclass(kw_only=True)
-class TerminationConfig:
-    """Distance from the plan at which an episode ends.
-
-    The joints alone cannot detect a robot that stands still while its plan moves on, so
-    errors of the base terminate episodes as well (Bogdanovic et al. 2022 and others).
-    """
-
-    # Distance between the base and the plan's base, m.
-    position: float = 0.35
-    # Angle between the base and the plan's base, rad.
-    rotation: float = 0.8
-
-    def check(self) -> None:
-        """Raises InputError unless both are above 0."""
-        for name, value in vars(self).items():
-            # Infinity never terminates.
-            if value != np.inf:
-                check_bounds(f"The termination's {name}", value, 0, above=True)
-
-    def exceeded(self, state: Array, plan_state: Array) -> NDArray[np.bool_]:
-        """Returns whether each robot is too far from its plan to come back, (...).
-
-        Args:
-            state: the plant's [q, v], shape (..., 37).
-            plan_state: the same of the plan.
-        """
-        gap = np.linalg.norm(state[..., 4:7] - plan_state[..., 4:7], axis=-1)
-        # A turn by an angle a takes a unit quaternion to one whose product with it is
-        # cos(a / 2), up to its sign.
-        product = np.einsum("...i,...i->...", state[..., :4], plan_state[..., :4])
-        turn = 2 * np.arccos(np.minimum(np.abs(product), 1.0))
-        return (gap > self.position) | (turn > self.rotation)
 
 
 @dataclass(kw_only=True)
@@ -71,12 +45,14 @@ class ResetNoise:
     def draw(self, state: Array, random: np.random.Generator) -> Array:
         """Returns a random state [q, v], as in Plan, near ``state``."""
         state = state.copy()
+        q, v = split(state)
         turn = yaw_quat(self.heading * random.standard_normal(1))[0]
-        state[:4] = quat_multiply(turn, state[:4])
-        state[19:25] = quat_rotate(turn, state[19:25].reshape(2, 3)).ravel()
-        state[4:6] += self.position * random.standard_normal(2)
-        state[7:19] += self.joints * random.standard_normal(12)
-        state[19:] += self.velocities * random.standard_normal(18)
+        q[ORIENTATION] = quat_multiply(turn, q[ORIENTATION])
+        v[ANGULAR_VELOCITY] = quat_rotate(turn, v[ANGULAR_VELOCITY])
+        v[VELOCITY] = quat_rotate(turn, v[VELOCITY])
+        q[POSITION][:2] += self.position * random.standard_normal(2)
+        q[JOINTS] += self.joints * random.standard_normal(12)
+        v += self.velocities * random.standard_normal(18)
         return state
 
 

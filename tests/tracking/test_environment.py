@@ -10,6 +10,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import yaw_of
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.reward import REWARD_TERMS
+from loco_drake.control.state import TerminationConfig
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import save_motion
@@ -17,7 +18,7 @@ from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
 from loco_drake.systems.simulator import MakeSimulator, StartEpisode
 from loco_drake.tracking.batch import TrackingBatch
-from loco_drake.tracking.config import EnvironmentConfig, ResetNoise, TerminationConfig
+from loco_drake.tracking.config import EnvironmentConfig, ResetNoise
 from loco_drake.tracking.environment import TrackingEnv, make_tracking
 from loco_drake.tracking.references import load_references
 from tests.synthetic_motion import synthetic_motion

@@ -6,6 +6,7 @@ import pytest
 from loco_drake.common.errors import InputError
 from loco_drake.control.observation import OBSERVATION_LAYOUT
 from loco_drake.control.plan import PLAN_DT
+from loco_drake.control.state import TerminationConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.domain import SetDomain
@@ -17,7 +18,7 @@ from loco_drake.systems.scenario import (
 )
 from loco_drake.systems.simulator import MakeSimulator
 from loco_drake.tracking.batch import TrackingBatch
-from loco_drake.tracking.config import EnvironmentConfig, ResetNoise, TerminationConfig
+from loco_drake.tracking.config import EnvironmentConfig, ResetNoise
 from loco_drake.tracking.environment import TrackingEnv
 from loco_drake.tracking.randomization import (
     BIAS,
