@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
+from loco_drake.cli.options import DataDir, Json, UnusedSeed
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.files import atomic_path
 
@@ -18,12 +19,9 @@ if TYPE_CHECKING:
 class DataList:
     """List the sources of motion with duration, gaits and licence."""
 
-    # Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache folder.
-    data_dir: Path | None = None
-    # Write the figures of each source to this JSON file.
-    json: Path | None = None
-    # Accepted by every command; this one uses no random numbers.
-    seed: int = 0
+    data_dir: DataDir = None
+    json: Json = None
+    seed: UnusedSeed = 0
 
     def run(self) -> int:
         """Prints the table; returns 0.
@@ -81,10 +79,8 @@ class DataInspect:
     fps: float | None = None
     # PNG file to write. Default: the name of the recording, in the current folder.
     out: Path | None = None
-    # Write the figures to this JSON file.
-    json: Path | None = None
-    # Accepted by every command; this one uses no random numbers.
-    seed: int = 0
+    json: Json = None
+    seed: UnusedSeed = 0
 
     def run(self) -> int:
         """Writes the picture and prints the table; returns 0.

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from loco_drake.cli.evaluation import Evaluation, print_report, say_of, trained_on
+from loco_drake.cli.options import Generator, Tokenizer
 from loco_drake.cli.output import print_failed, write_figure
 from loco_drake.evaluation.effort import Effort
 from loco_drake.motion.gaits import LABELS
@@ -34,10 +35,8 @@ class EvaluateGeneration(Effort, Evaluation):
 
     # Score the Motion files in this folder instead of generating motion.
     motions: Path | None = None
-    # Weights from `train tokenizer`. Default: the shipped weights.
-    tokenizer: Path | None = None
-    # Weights from `train generator`. Default: the shipped weights.
-    generator: Path | None = None
+    tokenizer: Tokenizer = None
+    generator: Generator = None
     # Folder for plots.
     figures: Path | None = None
     # Seed of the first motion and the first classifier; it increases by 1 for each

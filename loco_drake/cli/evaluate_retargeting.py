@@ -27,13 +27,11 @@ class EvaluateRetargeting(Evaluation):
     # Exit with status 1 if a figure of a clip is outside its bounds.
     strict: bool = False
 
-    def check(self) -> None:
-        """Raises InputError if an option is wrong; labels need not be known ones."""
+    def robots(self) -> list[str]:
+        """Returns the names of the robots, or a robot's file."""
         from loco_drake.models.robot_files import is_robot_file
 
-        if not is_robot_file(self.robot):
-            self.check_robot()
-        self.check_numbers()
+        return [self.robot] if is_robot_file(self.robot) else super().robots()
 
     def of_robots(self, names: list[str]) -> dict[str, Any]:
         """Returns the figures of all robots by name."""

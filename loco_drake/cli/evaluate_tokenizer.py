@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from loco_drake.cli.evaluation import Evaluation, print_report, trained_on
+from loco_drake.cli.options import Tokenizer
 from loco_drake.cli.output import print_failed, write_figure
 from loco_drake.common.errors import InputError
 
@@ -19,8 +20,7 @@ class EvaluateTokenizer(Evaluation):
 
     KEYS = ("labels", "all", "codebook_use")
 
-    # Weights from `train tokenizer`. Default: the shipped weights.
-    tokenizer: Path | None = None
+    tokenizer: Tokenizer = None
     # Number of codebooks to decode from, the coarsest first. Default: all.
     books: int | None = None
     # Folder for a plot of codebook usage.

@@ -1,10 +1,10 @@
 """The command ``evaluate tracking``."""
 
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from loco_drake.cli.evaluation import Evaluation, print_by_label
+from loco_drake.cli.options import Policy
 from loco_drake.cli.output import tracked
 from loco_drake.common.errors import check_choice
 from loco_drake.motion.gaits import any_label, parse_label
@@ -28,9 +28,7 @@ class EvaluateTracking(Evaluation):
     seeds: int = 20
     # Length of each episode in s; at most the length of a recording.
     duration: float = 10.0
-    # Weights of the policy, or the name of a shipped variant, such as randomized.
-    # Default: the robot's main policy.
-    policy: Path | None = None
+    policy: Policy = None
     # Contact solver: similar, lagged, sap or cenic.
     contact: str = "similar"
     # Time step of the physics, s.
@@ -57,8 +55,7 @@ class EvaluateTracking(Evaluation):
         """Raises InputError if an option is wrong."""
         from loco_drake.generation.generate import check_duration
 
-        self.check_robot()
-        self.check_numbers()
+        super().check()
         check_choice("reference", self.reference, ("generated", "retargeted"))
         check_duration(self.duration)
         if self.pushes:

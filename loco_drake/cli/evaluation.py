@@ -7,13 +7,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.console import Console
 
+from loco_drake.cli.options import DataDir, Json, UnusedSeed
 from loco_drake.cli.output import print_failed, print_table, write_results
-from loco_drake.common.errors import (
-    InputError,
-    check_at_least,
-    check_choice,
-    one_line,
-)
+from loco_drake.common.errors import InputError, check_at_least, check_choice, one_line
 from loco_drake.motion.gaits import parse_label
 
 if TYPE_CHECKING:
@@ -33,16 +29,13 @@ class Evaluation:
     # Gait labels, such as dog-trot dog-pace. Default: all of the fifteen with
     # recordings.
     labels: tuple[str, ...] = ()
-    # Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache folder.
-    data_dir: Path | None = None
+    data_dir: DataDir = None
     # Number of worker processes.
     workers: int = 1
     # Accepted by every evaluation; this one is deterministic.
     seeds: int = 1
-    # Accepted by every command; this one uses no random numbers.
-    seed: int = 0
-    # Write the figures to this JSON file.
-    json: Path | None = None
+    seed: UnusedSeed = 0
+    json: Json = None
 
     def run(self) -> int:
         """Prints tables for each robot and writes the figures; returns the exit status.
@@ -50,31 +43,23 @@ class Evaluation:
         Raises:
             InputError: if an option is wrong, or there is nothing to evaluate.
         """
-        from loco_drake.models.robots import ROBOTS
-
         self.check()
-        result = self.of_robots(list(ROBOTS) if self.robot == "all" else [self.robot])
+        result = self.of_robots(self.robots())
         write_results(self.json, result)
         robots = result.get("robots", {self.robot: result})
         return max(self.show(name, figures) for name, figures in robots.items())
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""
-        self.check_robot()
-        self.check_numbers()
-        for label in self.labels:
-            parse_label(label)
+        for name, least in (("workers", 1), ("seeds", 1), ("seed", 0)):
+            check_at_least(name, getattr(self, name), least)
 
-    def check_robot(self) -> None:
-        """Raises InputError unless the robot is one of the two, or all."""
+    def robots(self) -> list[str]:
+        """Returns the names of the robots; raises InputError if they are unknown."""
         from loco_drake.models.robots import ROBOTS
 
         check_choice("robot", self.robot, (*ROBOTS, "all"))
-
-    def check_numbers(self) -> None:
-        """Raises InputError if there are too few seeds or workers."""
-        for name, least in (("workers", 1), ("seeds", 1), ("seed", 0)):
-            check_at_least(name, getattr(self, name), least)
+        return list(ROBOTS) if self.robot == "all" else [self.robot]
 
     def of_robots(self, names: list[str]) -> dict[str, Any]:
         """Returns the figures of one robot, or of all by name.
@@ -82,6 +67,8 @@ class Evaluation:
         Of several, the figures of a robot that cannot be evaluated are null, and its
         "reason" says why; if none can, that is an error.
         """
+        for label in self.labels:
+            parse_label(label)
         if len(names) == 1:
             return {"robot": names[0], **self.of_robot(names[0])}
         results: dict[str, dict[str, Any]] = {}

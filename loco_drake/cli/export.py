@@ -2,10 +2,8 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
-import tyro
-
+from loco_drake.cli.options import Policy, UnusedSeed
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import InputError
 
@@ -16,15 +14,12 @@ class Export:
 
     # Robot: go2 or a1.
     robot: str = "go2"
-    # Weights of the policy, or the name of a shipped variant, such as randomized.
-    # Default: the robot's main policy.
-    policy: Path | None = None
+    policy: Policy = None
     # ONNX file to write.
     out: Path = Path("policy.onnx")
     # Write the metadata to this JSON file.
-    json: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    # Accepted by every command; this one uses no random numbers.
-    seed: int = 0
+    json: Path | None = None
+    seed: UnusedSeed = 0
 
     def run(self) -> int:
         """Writes and prints; returns the exit status."""

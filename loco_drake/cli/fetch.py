@@ -3,19 +3,13 @@
 import re
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import tyro
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    DownloadColumn,
-    Progress,
-    TextColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import DownloadColumn, Progress
 
+from loco_drake.cli.options import DataDir, Json, UnusedSeed
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import InputError, check_choice
 
@@ -43,16 +37,12 @@ class DataFetch:
 
     # Sources to download, such as dog. Default: all.
     source: tyro.conf.UseAppendAction[tuple[tuple[str, ...], ...]] = ()
-    # Folder for the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache
-    # folder.
-    data_dir: Path | None = None
+    data_dir: DataDir = None
     # Download from a copy: a folder or an http(s) address with the layout of the data
     # folder.
     mirror: str | None = None
-    # Write the figures of each source to this JSON file.
-    json: Path | None = None
-    # Accepted by every command; this one uses no random numbers.
-    seed: int = 0
+    json: Json = None
+    seed: UnusedSeed = 0
 
     def run(self) -> int:
         """Fetches what is missing; returns 1 if a file failed, else 0.
@@ -61,56 +51,40 @@ class DataFetch:
             InputError: if an option is wrong, or the folder's segments.csv damaged.
             OSError: if the folder cannot be written to.
         """
-        from loco_drake.datasets.download import (
-            download_files,
-            files_by_source,
-            parse_mirror,
-        )
+        from loco_drake.datasets import download, segments
         from loco_drake.datasets.registry import DATASETS, data_target
-        from loco_drake.datasets.segments import (
-            add_shipped_rows,
-            read_rows,
-            write_rows,
-        )
 
-        files = files_by_source()
+        files = download.files_by_source()
         if wanted := [check_choice("source", s, files) for g in self.source for s in g]:
             files = {source: files[source] for source in files if source in wanted}
-        mirror = parse_mirror(self.mirror)
+        mirror = download.parse_mirror(self.mirror)
         folder = data_target(self.data_dir)
         if folder.exists() and not folder.is_dir():
             raise InputError(f"{str(folder)!r} is a file, not a folder for recordings.")
         table = folder / "segments.csv"
         if table.is_symlink():
             raise InputError(f"{str(table)!r} is a link, which is not written to.")
-        rows = read_rows(table) if table.exists() else []
+        rows = segments.read_rows(table) if table.exists() else []
         missing = {
             source: [file for file in listed if not file.is_present(folder)]
             for source, listed in files.items()
         }
         _print_sources(files, missing)
         to_fetch = [file for listed in missing.values() for file in listed]
-        progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            DownloadColumn(),
-            TimeRemainingColumn(),
-            console=Console(stderr=True),
-            transient=True,
-        )
-        with progress:
-            task = progress.add_task("Fetching", total=sum(f.size for f in to_fetch))
+        columns = (*Progress.get_default_columns(), DownloadColumn())
+        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task("Fetching", total=sum(f.size for f in to_fetch))
 
             def report(done: int) -> None:
-                progress.update(task, completed=done)
+                bar.update(task, completed=done)
 
-            outcomes = download_files(to_fetch, folder, mirror, report)
+            outcomes = download.download_files(to_fetch, folder, mirror, report)
             failed = {file.name: error for file, error in outcomes if error}
         names = [file.name for listed in files.values() for file in listed]
         present = [name for name in names if name not in failed]
-        merged = add_shipped_rows(rows, present)
+        merged = segments.add_shipped_rows(rows, present)
         if merged != rows:
-            write_rows(table, merged)
+            segments.write_rows(table, merged)
         figures = {}
         for source, listed in files.items():
             lost = {f.name: failed[f.name] for f in listed if f.name in failed}
@@ -141,24 +115,14 @@ def _print_sources(
 ) -> None:
     from loco_drake.datasets.registry import DATASETS
 
-    def megabytes(listed: "list[RemoteFile]") -> str:
-        return f"{sum(file.size for file in listed) / 1e6:.1f}"
-
-    print_table(
-        "Recordings, and whose they are",
-        ["source", "files", "MB", "MB to fetch", "licence", "attribution"],
-        [
-            [
-                source,
-                str(len(listed)),
-                megabytes(listed),
-                megabytes(missing[source]),
-                DATASETS[source].licence,
-                DATASETS[source].attribution,
-            ]
-            for source, listed in files.items()
-        ],
-    )
+    rows = []
+    for source, listed in files.items():
+        sizes = [sum(file.size for file in of) for of in (listed, missing[source])]
+        megabytes = [f"{size / 1e6:.1f}" for size in sizes]
+        whose = (DATASETS[source].licence, DATASETS[source].attribution)
+        rows.append((source, str(len(listed)), *megabytes, *whose))
+    columns = ("source", "files", "MB", "MB to fetch", "licence", "attribution")
+    print_table("Recordings, and whose they are", columns, rows)
     for licence in dict.fromkeys(DATASETS[source].licence for source in files):
         if conditions := describe_licence(licence):
             print(f"{licence}: {conditions}.")

@@ -4,6 +4,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from loco_drake.cli.options import Generator, Json, Tokenizer
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import check_at_least, check_choice
 from loco_drake.motion.gaits import parse_schedule
@@ -37,12 +38,9 @@ class Generate:
     temperature: float = 1.0
     # Sample from the likeliest codes that together have this probability.
     top_p: float = 0.95
-    # Weights from `train tokenizer`. Default: the shipped weights.
-    tokenizer: Path | None = None
-    # Weights from `train generator`. Default: the shipped weights.
-    generator: Path | None = None
-    # Write the figures to this JSON file.
-    json: Path | None = None
+    tokenizer: Tokenizer = None
+    generator: Generator = None
+    json: Json = None
 
     def run(self) -> int:
         """Writes the files and prints the figures; returns 0.

@@ -52,55 +52,60 @@ def main(arguments: list[str] | None = None) -> int:
     Args:
         arguments: the arguments; those of the process if None.
     """
-    arguments = sys.argv[1:] if arguments is None else arguments
     try:
-        if not arguments or arguments[0] in _HELP:
-            _print_help(list(_COMMANDS))
-            return 0
-        if arguments[0] == "--version":
-            print(__version__)
-            return 0
-        members = [n for n in _COMMANDS if n.startswith(f"{arguments[0]} ")]
-        if members and arguments[1:2] and arguments[1] in _HELP:
-            _print_help(members)
-            return 0
-        name, rest = _split(arguments, members)
-        use_one_thread()
-        command = command_class(name)
-        # A filter, since importing Drake resets the level.
-        logging.getLogger("drake").addFilter(_is_error)
-        prog = f"loco-drake {name}"
-        parsed: Any = tyro.cli(command, prog=prog, args=rest)
-        for option in _OUTPUTS:
-            into = option == "figures" or (option == "out" and name not in _ONE_FILE)
-            check_writable(getattr(parsed, option, None), folder=into)
-        if getattr(parsed, "resume", False):
-            from loco_drake.cli.training import parse_resumed
-
-            parsed = parse_resumed(parsed, prog, rest)
-        status: int = parsed.run()
-        return status
+        return _run(sys.argv[1:] if arguments is None else arguments)
     except InputError as error:
-        print(f"loco-drake: {error}", file=sys.stderr)
-        return 2
+        return _failed(str(error), 2)
     except ImportError as error:
         if "cannot open shared object file" not in str(error):
             raise
         library = str(error).split(":")[0]
-        print(
-            f"loco-drake: This system lacks {library}; on Debian or Ubuntu, "
-            f"install it with: apt-get install {_LIBRARIES}.",
-            file=sys.stderr,
+        return _failed(
+            f"This system lacks {library}; on Debian or Ubuntu, install it with: "
+            f"apt-get install {_LIBRARIES}."
         )
-        return 1
     except OSError as error:
         # Such as a full disk or a read-only folder.
         reason = f"{error.strerror}: {error.filename}" if error.filename else error
-        print(f"loco-drake: {one_line(str(reason))}", file=sys.stderr)
-        return 1
+        return _failed(one_line(str(reason)))
     except KeyboardInterrupt:
-        print("loco-drake: interrupted", file=sys.stderr)
-        return 1
+        return _failed("interrupted")
+
+
+def _failed(reason: str, status: int = 1) -> int:
+    print(f"loco-drake: {reason}", file=sys.stderr)
+    return status
+
+
+def _run(arguments: list[str]) -> int:
+    first = arguments[0] if arguments else "--help"
+    if first == "--version":
+        print(__version__)
+        return 0
+    members = [name for name in _COMMANDS if name.startswith(f"{first} ")]
+    if first in _HELP or (members and arguments[1:2] and arguments[1] in _HELP):
+        _print_help(members or list(_COMMANDS))
+        return 0
+    words = 2 if members else 1
+    if len(arguments) < words:
+        raise InputError(f"Name a subcommand: {', '.join(members)}.")
+    name, rest = " ".join(arguments[:words]), arguments[words:]
+    check_choice("command", name, members or _COMMANDS)
+    use_one_thread()
+    command = command_class(name)
+    # A filter, since importing Drake resets the level.
+    logging.getLogger("drake").addFilter(_is_error)
+    prog = f"loco-drake {name}"
+    parsed: Any = tyro.cli(command, prog=prog, args=rest)
+    for option in _OUTPUTS:
+        into = option == "figures" or (option == "out" and name not in _ONE_FILE)
+        check_writable(getattr(parsed, option, None), folder=into)
+    if getattr(parsed, "resume", False):
+        from loco_drake.cli.training import parse_resumed
+
+        parsed = parse_resumed(parsed, prog, rest)
+    status: int = parsed.run()
+    return status
 
 
 def command_class(name: str) -> Any:
@@ -117,21 +122,6 @@ def command_class(name: str) -> Any:
 def _is_error(record: logging.LogRecord) -> bool:
     """Returns False for messages about harmless properties of models."""
     return record.levelno >= logging.ERROR
-
-
-def _split(arguments: list[str], members: list[str]) -> tuple[str, list[str]]:
-    """Returns the command's name and its own arguments.
-
-    Args:
-        arguments: at least one.
-        members: the commands of two words whose first word comes first.
-    """
-    words = 2 if members else 1
-    if len(arguments) < words:
-        raise InputError(f"Name a subcommand: {', '.join(members)}.")
-    name = " ".join(arguments[:words])
-    check_choice("command", name, members or _COMMANDS)
-    return name, arguments[words:]
 
 
 def _print_help(names: list[str]) -> None:

@@ -6,16 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import tyro
-from rich.console import Console
-from rich.progress import Progress
 
-from loco_drake.cli.output import (
-    MARK,
-    print_failed,
-    print_table,
-    print_warnings,
-    write_json,
-)
+from loco_drake.cli import output
+from loco_drake.cli.options import DataDir, Json
+from loco_drake.cli.output import MARK, print_table
 from loco_drake.common.errors import InputError, check_at_least, check_choice
 from loco_drake.motion.gaits import LABELS
 
@@ -66,12 +60,10 @@ class Retarget:
     trajectories: int = 10
     # Number of worker processes.
     workers: int = 1
-    # Folder of the recordings. Default: $LOCO_DRAKE_DATA, else the user's cache folder.
-    data_dir: Path | None = None
+    data_dir: DataDir = None
     # Exit with status 1 if a figure of a clip is outside its bounds.
     strict: bool = False
-    # Write the figures of each clip to this JSON file.
-    json: Path | None = None
+    json: Json = None
     # Seed of the split and of the choice of trajectories.
     seed: int = 0
 
@@ -96,68 +88,55 @@ class Retarget:
         segments, split = self._segments()
         variant = Variant(mirror=self.mirror, froude=self.froude)
         out = self.out or Path("motions") / f"{robot.name}{variant.suffix}"
-        outcomes: list[Outcome] = []
-        with Progress(console=Console(stderr=True), transient=True) as progress:
-            task = progress.add_task("Retargeting", total=len(segments))
-            for outcome in retarget_segments(
-                segments, robot, out, split, self.workers, variant
-            ):
-                outcomes.append(outcome)
-                progress.advance(task)
+        done = retarget_segments(segments, robot, out, split, self.workers, variant)
+        outcomes = list(output.tracked(done, "Retargeting", len(segments)))
         failed = [outcome for outcome in outcomes if outcome.error is not None]
         if self.file is not None and failed:
             raise InputError(str(failed[0].error))
-        write_json(self.json, {o.segment.name: _figures(o) for o in outcomes})
+        output.write_json(self.json, {o.segment.name: _figures(o) for o in outcomes})
         reports = {o.segment.name: o.report for o in outcomes if o.report is not None}
         doubtful = {name: r.warnings for name, r in reports.items() if r.warnings}
         rows = [[k + MARK * (k in doubtful), *_cells(r)] for k, r in reports.items()]
         title = f"Motion files in {out}: {len(rows)}{', mirrored' * self.mirror}"
         print_table(title, ["clip", *_COLUMNS], rows)
-        print_warnings(doubtful)
+        output.print_warnings(doubtful)
         if split is not None and self.trajectories:
             self._cut(outcomes, split, out.parent / f"{out.name}-trajectories")
-        print_failed((o.segment.name, str(o.error)) for o in failed)
+        output.print_failed((o.segment.name, str(o.error)) for o in failed)
         return 1 if failed or (self.strict and doubtful) else 0
 
     def _cut(self, outcomes: "list[Outcome]", split: "Split", folder: Path) -> None:
         from loco_drake.datasets.split import TRAIN, VALIDATION
+        from loco_drake.retargeting import trajectories
         from loco_drake.retargeting.retarget import stretches_of
-        from loco_drake.retargeting.trajectories import (
-            SECONDS,
-            choose_windows,
-            write_trajectories,
-        )
 
-        windows = choose_windows(
-            stretches_of(outcomes, split), self.trajectories, self.seed
-        )
-        write_trajectories(windows, folder)
+        stretches = stretches_of(outcomes, split)
+        windows = trajectories.choose_windows(stretches, self.trajectories, self.seed)
+        trajectories.write_trajectories(windows, folder)
         counts = Counter((w.stretch.label, w.stretch.side) for w in windows)
         rows = [
             [str(label), *(str(counts[label, side]) for side in (TRAIN, VALIDATION))]
             for label in LABELS
             if label in {w.stretch.label for w in windows}
         ]
-        title = f"Trajectories of {SECONDS:g} s in {folder}: {len(windows)}"
+        title = (
+            f"Trajectories of {trajectories.SECONDS:g} s in {folder}: {len(windows)}"
+        )
         print_table(title, ["label", TRAIN, VALIDATION], rows)
 
     def _segments(self) -> "tuple[list[Segment], Split | None]":
         """Returns what to retarget, and the split of the data folder it is from."""
+        from loco_drake.datasets import segments
         from loco_drake.datasets.registry import data_dir
-        from loco_drake.datasets.segments import (
-            one_format,
-            read_segments,
-            select_segments,
-        )
         from loco_drake.datasets.split import Split
 
         if self.file is not None:
             return [self._segment_of_file(self.file)], None
         if (self.start, self.end, self.fps) != (None, None, None):
             raise InputError("--start, --end and --fps need a FILE.")
-        segments = one_format(read_segments(data_dir(self.data_dir)))
-        split = Split(segments, self.seed)
-        return select_segments(segments, self.source, self.gait), split
+        table = segments.one_format(segments.read_segments(data_dir(self.data_dir)))
+        split = Split(table, self.seed)
+        return segments.select_segments(table, self.source, self.gait), split
 
     def _segment_of_file(self, file: Path) -> "Segment":
         from loco_drake.datasets.registry import read_clip

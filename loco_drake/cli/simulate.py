@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import tyro
-
+from loco_drake.cli.options import Json, Policy, option
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import atomic_path
@@ -23,29 +22,22 @@ if TYPE_CHECKING:
 _MAX_DURATION = 3600.0
 
 
-def _default(value: str, metavar: str) -> Any:
-    """Documents the default of an option that a scenario can also set."""
-    hint = f"(default: {value})"
-    return tyro.conf.arg(metavar=metavar, help_behavior_hint=hint)
-
-
 @dataclass(kw_only=True)
 class Simulate:
     """Simulate a robot in Drake that tracks generated motion or a Motion file."""
 
     # Robot: go2 or a1.
-    robot: Annotated[str | None, _default("go2", "STR")] = None
+    robot: Annotated[str | None, option(metavar="STR", default="go2")] = None
     # Gait label, such as dog-trot, or a schedule of labels with start times in s, such
     # as dog-pace,dog-trot@3. Ignored with a Motion file.
-    gait: Annotated[str | None, _default("dog-trot", "STR")] = None
+    gait: Annotated[str | None, option(metavar="STR", default="dog-trot")] = None
     # Seconds to simulate; at most the length of a Motion file.
-    duration: Annotated[float | None, _default("10.0", "FLOAT")] = None
+    duration: Annotated[float | None, option(metavar="FLOAT", default="10.0")] = None
     # Seed of the generated motion.
-    seed: Annotated[int | None, _default("0", "INT")] = None
+    seed: Annotated[int | None, option(metavar="INT", default="0")] = None
     # gpt, to generate motion during the simulation, or the path of a Motion file.
-    reference: Annotated[str | None, _default("gpt", "STR")] = None
-    # Weights of the policy, or the name of a shipped variant, such as randomized.
-    policy: Annotated[Path | None, _default("the robot's main one", "PATH")] = None
+    reference: Annotated[str | None, option(metavar="STR", default="gpt")] = None
+    policy: Policy = None
     # Show the simulation in the browser, at most at real-time speed.
     meshcat: bool = True
     # Meshcat's port. Default: a free one, also if the port is in use.
@@ -53,18 +45,17 @@ class Simulate:
     # Save a replay as one HTML page.
     html: Path | None = None
     # Contact solver: similar, lagged, sap or cenic.
-    contact: Annotated[str | None, _default("similar", "STR")] = None
+    contact: Annotated[str | None, option(metavar="STR", default="similar")] = None
     # Time step of the physics, s.
-    time_step: Annotated[float | None, _default("0.01", "FLOAT")] = None
+    time_step: Annotated[float | None, option(metavar="FLOAT", default="0.01")] = None
     # Coulomb friction coefficient of the ground.
-    friction: Annotated[float | None, _default("0.8", "FLOAT")] = None
+    friction: Annotated[float | None, option(metavar="FLOAT", default="0.8")] = None
     # Scenario in YAML, see loco_drake.systems.scenario. Its fields replace the defaults
     # of the options above; options that are given take precedence.
-    scenario: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
+    scenario: Annotated[Path | None, option(metavar="PATH")] = None
     # YAML that overrides fields of the scenario, as in "plant: {accuracy: 1.0e-4}".
-    overlay: Annotated[str | None, tyro.conf.arg(metavar="TEXT")] = None
-    # Write the figures to this JSON file.
-    json: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
+    overlay: Annotated[str | None, option(metavar="TEXT")] = None
+    json: Json = None
 
     def run(self) -> int:
         """Simulates, prints and writes; returns the exit status."""

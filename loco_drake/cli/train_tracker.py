@@ -5,8 +5,7 @@ from pathlib import Path
 from statistics import fmean
 from typing import Annotated, ClassVar
 
-import tyro
-
+from loco_drake.cli.options import Json, option
 from loco_drake.cli.output import print_table, write_results
 from loco_drake.cli.training import print_stopped
 from loco_drake.common.errors import InputError, check_at_least
@@ -24,19 +23,18 @@ class TrainTracker(TrainingConfig):
     NAME: ClassVar[str] = "tracker"
     # Folder of Motion files to track, such as `generate` writes. Required
     # without --resume.
-    references: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
+    references: Annotated[Path | None, option(metavar="PATH")] = None
     # Folder for the checkpoint, policy and TensorBoard logs.
     out: Path = Path("runs/tracker")
     # Randomize friction, masses, motors, latency, pushes and sensor noise in each
     # episode. Parts without a range of their own use the standard range.
     randomize: bool = False
     # A checkpoint.safetensors of any robot whose networks to start from.
-    start_from: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    start_from: Annotated[Path | None, option(metavar="FILE")] = None
     # Continue from the checkpoint in --out with the options of that run. Only --steps
     # may increase.
     resume: bool = False
-    # Write the figures to this JSON file.
-    json: Path | None = None
+    json: Json = None
 
     def run(self) -> int:
         """Trains, prints and writes; returns the exit status."""

@@ -1,17 +1,69 @@
 """Steps that the ``train`` commands share."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import tyro
 from rich.console import Console
 
+from loco_drake.cli.options import Json
+from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import InputError
+from loco_drake.generation.loop_settings import LoopSettings
+
+if TYPE_CHECKING:
+    from loco_drake.generation.training import LoopResult
 
 # Options that are not the run's: where it is, and what a call does.
 _OF_THE_CALL = ("out", "resume", "json", "start_from")
 # Where it learned from may be elsewhere now: what is there is compared.
 _FOLDERS = ("motions", "references", "tokenizer")
+
+
+class Scores(NamedTuple):
+    """What a network has learned: figures for JSON, and a table."""
+
+    figures: dict[str, Any]
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    title: str = ""  # behind the name of the weights file
+
+
+# How a training ended, and what scores the network.
+Learned = tuple["LoopResult", Callable[[], Scores]]
+
+
+@dataclass(kw_only=True)
+class NetworkTraining(LoopSettings):
+    """Base of the commands that train a network, which is called NAME."""
+
+    NAME: ClassVar[str]
+    json: Json = None
+
+    def run(self) -> int:
+        """Trains, prints and writes; returns 1 if it was stopped early, else 0.
+
+        Raises:
+            InputError: if an option is wrong.
+        """
+        from loco_drake.common.run_folder import check_folder
+
+        self.check()
+        weights = self.out / f"{self.NAME}.safetensors"
+        check_folder(self.out, weights.name, self.resume)
+        result, score = self.learn()
+        if result.stopped:
+            return print_stopped(result.steps, self.steps)
+        scores = score()
+        training = {"steps": result.steps, "wall_clock_s": result.seconds}
+        write_json(self.json, {**training, **scores.figures})
+        print_table(f"{weights}{scores.title}", scores.columns, scores.rows)
+        return 0
+
+    def learn(self) -> Learned:
+        """Reads the motions and trains."""
+        raise NotImplementedError
 
 
 def parse_resumed(command: Any, prog: str, args: Sequence[str]) -> Any:
@@ -26,27 +78,20 @@ def parse_resumed(command: Any, prog: str, args: Sequence[str]) -> Any:
         InputError: if there is no sound checkpoint of such a training, or an option
             contradicts it.
     """
-    from loco_drake.common.run_folder import (
-        CHECKPOINT,
-        check_folder,
-        check_same,
-        options_of,
-        read_checkpoint,
-        settings,
-        sound,
-        with_options,
-    )
+    from loco_drake.common import run_folder
 
     if getattr(command, "start_from", None) is not None:
         raise InputError("Give either --start-from or --resume, not both.")
-    check_folder(command.out, CHECKPOINT, resume=True)
-    saved = read_checkpoint(command.out / CHECKPOINT, command.NAME)
+    run_folder.check_folder(command.out, run_folder.CHECKPOINT, resume=True)
+    path = command.out / run_folder.CHECKPOINT
+    saved = run_folder.read_checkpoint(path, command.NAME)
     own = {k: v for k, v in saved.options.items() if k not in _OF_THE_CALL}
-    with sound(saved.path):
-        default = with_options(command, own)
+    with run_folder.sound(path):
+        default = run_folder.with_options(command, own)
     parsed = tyro.cli(type(command), prog=prog, args=args, default=default)
-    options = settings(options_of(parsed), *_OF_THE_CALL, *_FOLDERS)
-    check_same(saved, options, options, parsed.steps)
+    options = run_folder.options_of(parsed)
+    own = run_folder.settings(options, *_OF_THE_CALL, *_FOLDERS)
+    run_folder.check_same(saved, own, own, parsed.steps)
     return parsed
 
 

@@ -1,13 +1,7 @@
 """How far a training is, on stderr."""
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import MofNCompleteColumn, Progress, TextColumn
 
 
 def progress_bar() -> Progress:
@@ -17,11 +11,9 @@ def progress_bar() -> Progress:
     """
     console = Console(stderr=True)
     return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
+        *Progress.get_default_columns(),
         MofNCompleteColumn(),
         TextColumn("{task.fields[note]}"),
-        TimeRemainingColumn(),
         console=console,
         disable=not console.is_terminal,
         refresh_per_second=2,

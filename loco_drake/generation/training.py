@@ -2,6 +2,7 @@
 
 import json
 import math
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -35,6 +36,7 @@ class LoopResult:
     steps: int  # optimizer steps taken in all, those before a resume included
     stopped: bool  # whether it was stopped by Ctrl-C before its last step
     loss: float  # of the last batch
+    seconds: float  # of this call
 
 
 def train(
@@ -60,6 +62,7 @@ def train(
         InputError: see :func:`loco_drake.common.run_folder.open_run`.
     """
     config.check()
+    start = time.perf_counter()
     run = settings({**{key: getattr(config, key) for key in RUN_SETTINGS}, **run})
     run = json.loads(json.dumps(run))  # as a checkpoint gives it back
     optimizer = torch.optim.AdamW(
@@ -117,7 +120,8 @@ def train(
                     save()
         save()
         module.eval()
-    return LoopResult(step, step < config.steps, last)
+    seconds = time.perf_counter() - start
+    return LoopResult(step, step < config.steps, last, seconds)
 
 
 def _schedule(progress: float) -> float:
