@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import product
 
 from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
@@ -96,8 +97,7 @@ def MakeLocomotionDiagram(
     quaternions in plan_state and state have length one.
 
     The subsystems are named plant, scene_graph, robot_state, reference, steering,
-    smoother,
-    observation, policy, joint_targets, plan_state and reward; the scenario's
+    smoother, observation, policy, joint_targets, plan_state and reward; the scenario's
     disturbances add actuation, pushes and sensors. A robot must start on its plan, so
     simulate it like this::
 
@@ -106,11 +106,7 @@ def MakeLocomotionDiagram(
         simulator.AdvanceTo(10.0)
 
     Drake never frees a diagram that contains systems written in Python. Reuse one
-    diagram for all episodes.
-
-    Args:
-        scenario: the scenario.
-        meshcat: where to draw the robot and the plan's keypoints.
+    diagram for all episodes. ``meshcat`` shows the robot and the plan's keypoints.
 
     Raises:
         InputError: if the scenario is invalid.
@@ -137,9 +133,6 @@ def AddLocomotion(
         meshcat: where to draw the robot and the plan's keypoints.
         pre_finalize: called with plant and scene graph; may add bodies to the plant.
 
-    Returns:
-        The plant, and the ports of :func:`MakeLocomotionDiagram` by name.
-
     Raises:
         InputError: if the scenario is invalid, or the builder has a plant.
     """
@@ -154,10 +147,8 @@ def AddLocomotion(
         builder, robot, scenario.plant, pre_finalize
     )
     made = Locomotion(robot, plant, scene_graph, instance)
-    plant_state = plant.get_state_output_port(instance)
-    robot_state = _Add(
-        builder, "robot_state", RobotState(robot), plant_state=plant_state
-    )
+    robot_state, plant_state = RobotState(robot), plant.get_state_output_port(instance)
+    _Add(builder, "robot_state", robot_state, plant_state=plant_state)
     state = robot_state.GetOutputPort("state")
     measured, desired_state = _AddDisturbances(builder, made, scenario, state)
     if isinstance(scenario.policy, ExternalTargets):
@@ -195,11 +186,7 @@ def _Add(
 def _AddDisturbances(
     builder: DiagramBuilder, made: Locomotion, scenario: Scenario, state: OutputPort
 ) -> tuple[OutputPort, InputPort]:
-    """Adds the systems that simulate a world unlike the model.
-
-    Returns:
-        The port of the measured state and the port for the PD set-points.
-    """
+    """Simulates a world unlike the model; returns measured state and set-point port."""
     robot, plant, wanted = made.robot, made.plant, scenario.disturbances
     desired_state = plant.get_desired_state_input_port(made.instance)
     if wanted.actuation:
@@ -236,12 +223,9 @@ def _AddPlan(builder: DiagramBuilder, made: Locomotion, scenario: Scenario) -> N
     if scenario.smoother is not None:
         smoother = ToppraSmoother(made.robot, scenario.smoother)
         _Add(builder, "smoother", smoother, plan=chain[-1].GetOutputPort("plan"))
-        for system in chain:
-            for name in ("path_time", "fixed_time"):
-                if system.HasInputPort(name):
-                    builder.Connect(
-                        smoother.GetOutputPort(name), system.GetInputPort(name)
-                    )
+        for system, name in product(chain, ("path_time", "fixed_time")):
+            if system.HasInputPort(name):
+                builder.Connect(smoother.GetOutputPort(name), system.GetInputPort(name))
         chain.append(smoother)
     made.outputs["plan"] = chain[-1].GetOutputPort("plan")
 

@@ -4,7 +4,7 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.geometry import Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, EventStatus, LeafSystem
+from pydrake.systems.framework import Context, LeafSystem
 
 from loco_drake.common.rotations import quat_rotate
 from loco_drake.control.plan import standing_plan
@@ -29,21 +29,12 @@ class KeypointVisualizer(LeafSystem):
         - plan: abstract, Plan
 
     Front toes are blue, rear toes red. Withers and hip are green, and lie above the
-    robot's front and rear hip joints.
-
-    Args:
-        robot: the robot.
-        meshcat: the Meshcat to draw in.
-        path: the Meshcat path of the spheres.
-        period: time between frames in s; a sum of powers of two keeps times exact.
+    robot's front and rear hip joints. ``period`` is the time between frames in s; a sum
+    of powers of two keeps times exact.
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        meshcat: Meshcat,
-        path: str = "plan",
-        period: float = 1 / 64,
+        self, robot: Robot, meshcat: Meshcat, path: str = "plan", period: float = 1 / 64
     ) -> None:
         super().__init__()
         self._meshcat = meshcat
@@ -56,14 +47,12 @@ class KeypointVisualizer(LeafSystem):
         self.DeclarePeriodicPublishEvent(period, 0.0, self._publish)
         self.DeclareForcedPublishEvent(self._publish)
 
-    def _publish(self, context: Context) -> EventStatus:
+    def _publish(self, context: Context) -> None:
         time = context.get_time()
         plan = self._plan.Eval(context)
         k = plan.index(time)
         q = plan.q[k]
         trunk = q[POSITION] + quat_rotate(q[ORIENTATION], self._p_BK)
-        for path, p_W in zip(
-            self._paths, np.concatenate((plan.p_WF[k], trunk)), strict=True
-        ):
+        points = np.concatenate((plan.p_WF[k], trunk))
+        for path, p_W in zip(self._paths, points, strict=True):
             self._meshcat.SetTransform(path, RigidTransform(p_W), time)
-        return EventStatus.Succeeded()

@@ -29,11 +29,8 @@ class LocomotionSimulator(Simulator):
 
     Drake's discrete plants never normalize it, and no system can change the state of
     another. AdvanceTo therefore stops at the end of each control period and normalizes
-    the quaternion in the Context. The steps of the plant do not change.
-
-    Args:
-        diagram: a locomotion diagram, or one that contains locomotion diagrams or the
-            systems of :func:`.diagram.AddLocomotion` at any depth.
+    the quaternion in the Context. The steps of the plant do not change. The diagram
+    contains systems of :func:`.diagram.AddLocomotion` at any depth.
     """
 
     def __init__(self, diagram: Diagram) -> None:
@@ -55,11 +52,10 @@ class LocomotionSimulator(Simulator):
             period = math.floor(context.get_time() / PLAN_DT + _TOLERANCE) + 1
             until = min(period * PLAN_DT, boundary_time)
             status = super().AdvanceTo(until, interruptible=interruptible)
-            if status.reason() != SimulatorStatus.ReturnReason.kReachedBoundaryTime:
-                return status
-            if until == period * PLAN_DT:
+            reached = status.reason() == status.ReturnReason.kReachedBoundaryTime
+            if reached and until == period * PLAN_DT:
                 self._normalize(context)
-            if until == boundary_time:
+            if not reached or until == boundary_time:
                 return status
 
     def _normalize(self, root: Context) -> None:
@@ -75,10 +71,6 @@ class LocomotionSimulator(Simulator):
 
 def MakeSimulator(diagram: Diagram, scenario: Scenario) -> LocomotionSimulator:
     """Returns a simulator with the integrator and the real-time rate of ``scenario``.
-
-    Args:
-        diagram: see :class:`LocomotionSimulator`.
-        scenario: the scenario that the diagram was made from.
 
     Raises:
         InputError: if the diagram was made from another scenario, or CENIC would have
@@ -125,7 +117,7 @@ def StartEpisode(
     bit for bit. Values that you fixed at input ports remain. Initializes the simulator.
 
     Args:
-        simulator: the simulator of a diagram as in :class:`LocomotionSimulator`.
+        simulator: of a diagram as in :class:`LocomotionSimulator`.
         gait: replaces the scenario's gait of a generated reference.
         seed: replaces the scenario's seed of a generated reference.
         plan: replaces the plan of a reference that plays plans.

@@ -25,14 +25,13 @@ from loco_drake.common.weights import (
     save_weights,
 )
 from loco_drake.control.action import ACTION_SCALE
-from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
-from loco_drake.models.legs import (
-    MIRROR_AXIAL,
-    MIRROR_JOINT_SIGNS,
-    MIRROR_JOINTS,
-    MIRROR_LEGS,
-    MIRROR_POLAR,
+from loco_drake.control.observation import (
+    MIRROR_OBSERVATION,
+    MIRROR_OBSERVATION_SIGNS,
+    OBSERVATION_LAYOUT,
+    OBSERVATION_SIZE,
 )
+from loco_drake.models.legs import MIRROR_JOINT_SIGNS, MIRROR_JOINTS
 from loco_drake.models.robots import Robot
 from loco_drake.motion.motion import FPS
 
@@ -42,30 +41,6 @@ OBSERVATION_CLIP = 5.0  # standard deviations
 PRIVILEGED = ("v_WB_H", "height", "plan_p_H")
 
 Values = TypeVar("Values", Array, NDArray[np.float32], Tensor)
-
-# Permutation and signs that mirror a part of the observation; parts may repeat them.
-_KEEP = ([0], [1.0])
-_POLAR = ([0, 1, 2], MIRROR_POLAR)
-_AXIAL = ([0, 1, 2], MIRROR_AXIAL)
-_JOINTS = (MIRROR_JOINTS, MIRROR_JOINT_SIGNS)
-_LEGS = (MIRROR_LEGS, np.ones(4))
-_MIRRORS = {
-    "gravity_B": _POLAR,
-    "w_WB_B": _AXIAL,
-    "v_WB_H": _POLAR,
-    "height": _KEEP,
-    "joint_positions": _JOINTS,
-    "joint_velocities": _JOINTS,
-    "last_action": _JOINTS,
-    "plan_joint_velocities": _JOINTS,
-    "plan_joints": _JOINTS,
-    "plan_p_H": _POLAR,
-    "plan_R_B": _AXIAL,
-    "plan_v_H": _POLAR,
-    "plan_w_H": _AXIAL,
-    "plan_contacts": _LEGS,
-    "label": _KEEP,
-}
 
 
 class _Mirror:
@@ -82,19 +57,9 @@ class _Mirror:
         return (values[..., self._order] * self._signs).astype(values.dtype)
 
 
-def _observation_mirror() -> _Mirror:
-    orders, signs, start = [], [], 0
-    for name, size in OBSERVATION_LAYOUT:
-        order, sign = map(np.asarray, _MIRRORS[name])
-        for first in range(start, start + size, len(order)):
-            orders.append(first + order)
-            signs.append(sign)
-        start += size
-    return _Mirror(np.concatenate(orders), np.concatenate(signs))
-
-
-mirror_observations = _observation_mirror()  # of shape (..., OBSERVATION_SIZE)
-mirror_actions = _Mirror(MIRROR_JOINTS, MIRROR_JOINT_SIGNS)  # of shape (..., 12)
+# Of shape (..., OBSERVATION_SIZE) and (..., 12).
+mirror_observations = _Mirror(MIRROR_OBSERVATION, MIRROR_OBSERVATION_SIGNS)
+mirror_actions = _Mirror(MIRROR_JOINTS, MIRROR_JOINT_SIGNS)
 
 
 def unprivileged_mask() -> Tensor:

@@ -23,6 +23,13 @@ from loco_drake.control.state import (
     VELOCITY,
     split,
 )
+from loco_drake.models.legs import (
+    MIRROR_AXIAL,
+    MIRROR_JOINT_SIGNS,
+    MIRROR_JOINTS,
+    MIRROR_LEGS,
+    MIRROR_POLAR,
+)
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import ONE_HOT, ONE_HOT_SIZE
 
@@ -30,26 +37,49 @@ from loco_drake.motion.gaits import ONE_HOT, ONE_HOT_SIZE
 LOOK_AHEAD = np.array([1, 2, 4, 8])
 _K = len(LOOK_AHEAD)
 
-# Name and size of each part, in order. A policy's weights record this layout. H is the
-# heading frame: its origin is the base's, z is up, x is the base's x in the plane.
-OBSERVATION_LAYOUT = (
-    ("gravity_B", 3),  # direction of gravity
-    ("w_WB_B", 3),  # rad/s
-    ("v_WB_H", 3),  # m/s
-    ("height", 1),  # z of the base, m
-    ("joint_positions", 12),  # from the standing pose, rad
-    ("joint_velocities", 12),  # a tenth of rad/s
-    ("last_action", 12),
-    ("plan_joint_velocities", 12),  # of the next sample, a tenth of rad/s
-    ("plan_joints", 12 * _K),  # plan minus robot, rad
-    ("plan_p_H", 3 * _K),  # base position of the plan from the robot's, m
-    ("plan_R_B", 3 * _K),  # base rotation of the plan from the robot's, so(3), rad
-    ("plan_v_H", 3 * _K),  # base velocity of the plan, m/s
-    ("plan_w_H", 3 * _K),  # base angular velocity of the plan, rad/s
-    ("plan_contacts", 4 * _K),
-    ("label", ONE_HOT_SIZE),  # one-hot of the source, one-hot of the gait
+# How a part is mirrored left-right: order and signs of its numbers, which may repeat.
+_POLAR = ([0, 1, 2], MIRROR_POLAR)
+_AXIAL = ([0, 1, 2], MIRROR_AXIAL)
+_JOINTS = (MIRROR_JOINTS, MIRROR_JOINT_SIGNS)
+_FEET = (MIRROR_LEGS, [1.0] * 4)
+_SAME = ([0], [1.0])
+
+# Name, size and mirroring of each part, in order. H is the heading frame: its origin is
+# the base's, z is up, x is the base's x in the plane.
+_PARTS = (
+    ("gravity_B", 3, _POLAR),  # direction of gravity
+    ("w_WB_B", 3, _AXIAL),  # rad/s
+    ("v_WB_H", 3, _POLAR),  # m/s
+    ("height", 1, _SAME),  # z of the base, m
+    ("joint_positions", 12, _JOINTS),  # from the standing pose, rad
+    ("joint_velocities", 12, _JOINTS),  # a tenth of rad/s
+    ("last_action", 12, _JOINTS),
+    ("plan_joint_velocities", 12, _JOINTS),  # of the next sample, a tenth of rad/s
+    ("plan_joints", 12 * _K, _JOINTS),  # plan minus robot, rad
+    ("plan_p_H", 3 * _K, _POLAR),  # base position of the plan from the robot's, m
+    ("plan_R_B", 3 * _K, _AXIAL),  # base rotation from the robot's, so(3), rad
+    ("plan_v_H", 3 * _K, _POLAR),  # base velocity of the plan, m/s
+    ("plan_w_H", 3 * _K, _AXIAL),  # base angular velocity of the plan, rad/s
+    ("plan_contacts", 4 * _K, _FEET),
+    ("label", ONE_HOT_SIZE, _SAME),  # one-hot of the source, one-hot of the gait
 )
+# What a policy's weights record: names and sizes.
+OBSERVATION_LAYOUT = tuple((name, size) for name, size, _ in _PARTS)
 OBSERVATION_SIZE = sum(size for _, size in OBSERVATION_LAYOUT)
+
+
+def _mirror() -> tuple[Integers, Array]:
+    """Returns order and signs of all numbers of a mirrored observation."""
+    orders, signs, start = [], [], 0
+    for _, size, (order, sign) in _PARTS:
+        repeats = size // len(order)
+        orders += [start + k * len(order) + np.array(order) for k in range(repeats)]
+        signs += [sign] * repeats
+        start += size
+    return np.concatenate(orders), np.concatenate(signs)
+
+
+MIRROR_OBSERVATION, MIRROR_OBSERVATION_SIGNS = _mirror()
 
 
 @dataclass(frozen=True)

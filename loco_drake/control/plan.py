@@ -44,8 +44,7 @@ class Plan(Immutable):
     v: Array  # velocities, m/s and rad/s, shape (N, 6 + J)
     vdot: Array  # time derivatives of v, shape (N, 6 + J)
     p_WF: Array  # centres of the toe spheres in m, shape (N, 4, 3)
-    # Whether each foot should be on the ground, shape (N, 4).
-    contacts: Bools
+    contacts: Bools  # whether each foot should be on the ground, shape (N, 4)
     labels: Integers  # row of motion.gaits.ONE_HOT, shape (N,)
     # Time in the motion before smoothing, s, shape (N,); the smoother slows this clock
     # down where the robot could not keep up.
@@ -70,8 +69,7 @@ class Plan(Immutable):
                     f"{name} one that goes with that, not {given.shape}."
                 )
             # A copy, since the caller may hold the array or a view of it.
-            own: NDArray[Any] = given.astype(wanted)
-            object.__setattr__(self, name, _read_only(own))
+            object.__setattr__(self, name, _read_only(given.astype(wanted)))
         self._check_values()
         object.__setattr__(self, "q", _read_only(unit_base(self.q)))
 
@@ -173,18 +171,12 @@ def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> P
             f"The joints of the motion are not those of {robot.name}: "
             f"{', '.join(robot.joint_names)}."
         )
+    q = (motion.base_quaternion, motion.base_position, motion.joint_positions)
+    v = (motion.base_angular_velocity, motion.base_velocity, motion.joint_velocities)
     return make_plan(
         robot,
-        q=np.hstack(
-            (motion.base_quaternion, motion.base_position, motion.joint_positions)
-        ),
-        v=np.hstack(
-            (
-                motion.base_angular_velocity,
-                motion.base_velocity,
-                motion.joint_velocities,
-            )
-        ),
+        q=np.hstack(q),
+        v=np.hstack(v),
         contacts=motion.contacts,
         labels=motion.label_indices,
         start_time=start_time,
