@@ -35,16 +35,13 @@ from pydrake.systems.framework import DiagramBuilder
 
 from loco_drake.cli.output import write_json
 from loco_drake.control.action import set_points
-from loco_drake.control.plan import PLAN_DT, Plan, plan_from_motion
-from loco_drake.control.retiming import path_limits, smooth_plan
-from loco_drake.generation.generate import generate_motions
-from loco_drake.generation.motion_model import pretrained_motion_model
+from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.models.plant import AddRobotPlant, ConfigureSimulator, PlantConfig
 from loco_drake.models.robots import get_robot
-from loco_drake.motion.gaits import parse_label
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.config import EnvironmentConfig, PpoConfig, TrainingConfig
 from loco_drake.tracking.randomization import STANDARD, RandomizationConfig
+from loco_drake.tracking.references import generate_references
 from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.train import train_tracker
 from loco_drake.tracking.workers import WorkerVecEnv
@@ -52,18 +49,6 @@ from loco_drake.tracking.workers import WorkerVecEnv
 ROBOT = "go2"
 ROBOTS = 16  # in a worker
 BATCH = 256  # of the training whose memory is measured
-
-
-def make_plans() -> list[Plan]:
-    """Returns references such as training uses."""
-    robot = get_robot(ROBOT)
-    limits = path_limits(robot)
-    model = pretrained_motion_model(ROBOT)
-    return [
-        smooth_plan(robot, plan_from_motion(robot, motion), limits)
-        for gait in ("dog-pace", "dog-trot")
-        for motion in generate_motions(model, parse_label(gait), 6.0, range(4))
-    ]
 
 
 @dataclass
@@ -75,36 +60,31 @@ class Episode:
     steps: int = 0
 
 
-class Environment:
-    """Steps the environments of one training worker and remembers their episodes."""
+def run_environment(
+    batch: TrackingBatch, plans: list[Plan], random: np.random.Generator, steps: int
+) -> tuple[float, list[Episode]]:
+    """Does ``steps`` in all; returns the seconds they took and the episodes."""
 
-    def __init__(self, plans: list[Plan], config: EnvironmentConfig) -> None:
-        self._plans = plans
-        self._batch = TrackingBatch(plans, config, ROBOTS)
-        self._random = np.random.default_rng(0)
+    def reset(i: int) -> Episode:
+        batch.reset(i, random)
+        episodes.append(Episode(plans[batch.plan[i]], int(batch.start[i])))
+        return episodes[-1]
 
-    def run(self, steps: int) -> tuple[float, list[Episode]]:
-        """Does ``steps`` in all; returns the seconds they took and the episodes."""
-        actions = np.zeros((ROBOTS, 12))
-        start = time.process_time()
-        current = [self._reset(i) for i in range(ROBOTS)]
-        episodes = list(current)
-        for _ in range(steps // ROBOTS):
-            _, terminated, truncated = self._batch.step(actions)
-            self._batch.observe()
-            for episode in current:
-                episode.steps += 1
-            ended = np.flatnonzero(terminated | truncated)
-            for i in ended:
-                current[i] = self._reset(int(i))
-                episodes.append(current[i])
-            if len(ended):
-                self._batch.observe(ended)
-        return time.process_time() - start, episodes
-
-    def _reset(self, i: int) -> Episode:
-        self._batch.reset(i, self._random)
-        return Episode(self._plans[self._batch.plan[i]], int(self._batch.start[i]))
+    episodes: list[Episode] = []
+    actions = np.zeros((ROBOTS, 12))
+    start = time.process_time()
+    current = [reset(i) for i in range(ROBOTS)]
+    for _ in range(steps // ROBOTS):
+        _, terminated, truncated = batch.step(actions)
+        batch.observe()
+        for episode in current:
+            episode.steps += 1
+        ended = np.flatnonzero(terminated | truncated)
+        for i in ended:
+            current[i] = reset(int(i))
+        if len(ended):
+            batch.observe(ended)
+    return time.process_time() - start, episodes
 
 
 class BarePlant:
@@ -123,11 +103,8 @@ class BarePlant:
             self._context, np.zeros(24)
         )
 
-    def follow(self, episodes: list[Episode]) -> float:
+    def follow(self, episode: Episode) -> float:
         """Does what the environment did; returns the seconds spent stepping."""
-        return sum(self._follow(episode) for episode in episodes)
-
-    def _follow(self, episode: Episode) -> float:
         plan, first = episode.plan, episode.first
         self._simulator.get_mutable_context().SetTime(0.0)
         self._plant.SetPositionsAndVelocities(self._context, plan.state[first])
@@ -146,12 +123,13 @@ def against_plant(
     plans: list[Plan], config: EnvironmentConfig, steps: int, turns: int
 ) -> dict[str, float]:
     """Returns steps/s of the environments and of the bare plant, and their ratio."""
-    environment, bare = Environment(plans, config), BarePlant(config.plant)
-    bare.follow(environment.run(100)[1])  # warm
+    batch, bare = TrackingBatch(plans, config, ROBOTS), BarePlant(config.plant)
+    random = np.random.default_rng(0)
     pairs = []
-    for _ in range(turns):
-        own, episodes = environment.run(steps)
-        pairs.append((own, bare.follow(episodes)))
+    for count in (100, *[steps] * turns):
+        own, episodes = run_environment(batch, plans, random, count)
+        pairs.append((own, sum(map(bare.follow, episodes))))
+    del pairs[0]  # warmed up
     return {
         "environment_steps_per_second": steps / median(own for own, _ in pairs),
         "plant_steps_per_second": steps / median(plant for _, plant in pairs),
@@ -163,15 +141,9 @@ def two_workers(
     plans: list[Plan], config: EnvironmentConfig, steps: int, turns: int
 ) -> dict[str, float]:
     """Returns steps/s of one worker and of two, and their ratio."""
+    sizes = {"per_worker": ROBOTS, "seed": 0}
     both = [
-        WorkerVecEnv(
-            plans,
-            config,
-            PlanSampler(plans, 0),
-            workers=workers,
-            per_worker=ROBOTS,
-            seed=0,
-        )
+        WorkerVecEnv(plans, config, PlanSampler(plans, 0), workers=workers, **sizes)
         for workers in (1, 2)
     ]
 
@@ -208,9 +180,8 @@ def memory(
 
     def report(steps: int, scores: dict[str, float]) -> None:
         workers = sorted(child.pid or 0 for child in multiprocessing.active_children())
-        named = {"trainer": os.getpid()}
-        named |= {f"worker_{k}": pid for k, pid in enumerate(workers)}
-        sizes.append({name: resident(pid) for name, pid in named.items()})
+        named = {f"worker_{k}": resident(pid) for k, pid in enumerate(workers)}
+        sizes.append({"trainer": resident(os.getpid()), **named})
 
     training = TrainingConfig(
         steps=(batches + 1) * BATCH,  # the last is not reported
@@ -249,7 +220,8 @@ def main(
         json: where to write the figures.
     """
     torch.set_num_threads(1)
-    plans = make_plans()
+    gaits = ("dog-pace", "dog-trot")
+    plans = generate_references(get_robot(ROBOT), gaits, count=4, seconds=6.0, seed=0)
     config = EnvironmentConfig(
         robot=ROBOT,
         plant=PlantConfig(contact=contact, time_step=time_step),

@@ -24,12 +24,12 @@ SETTLED = 1.0  # s after the change from which on the speed counts
 
 
 def main(robot: str = "go2", count: int = 4, rows: int = 8) -> None:
-    """Prints the table.
+    """Prints the tables.
 
     Args:
-        robot: to generate for.
-        count: motions of each change, of as many seeds.
-        rows: changes to print.
+        robot: go2 or a1.
+        count: number of motions, and seeds, of each change.
+        rows: number of changes to print.
     """
     model = pretrained_motion_model(robot)
     known = [k for k in LABELS if str(k) in model.generator.config.labels]

@@ -12,6 +12,7 @@ from the root of the repository:
 import statistics
 import time
 
+import numpy as np
 import torch
 import tyro
 from pydrake.systems.analysis import Simulator
@@ -40,24 +41,20 @@ def planning_events(system: Diagram | LeafSystem, seconds: float) -> Times:
     simulator = Simulator(system)
     port, context = system.GetOutputPort("plan"), simulator.get_context()
     simulator.Initialize()
-    end, times = port.Eval(context).end_time, []
+    ends, times = [port.Eval(context).end_time], []
     for step in range(1, round(seconds / PERIOD) + 1):
         wall, processor = time.perf_counter(), time.process_time()
         simulator.AdvanceTo(step * PERIOD)
-        cost = (time.process_time() - processor, time.perf_counter() - wall)
-        if port.Eval(context).end_time > end:
-            end = port.Eval(context).end_time
-            times.append(cost)
-    return times[2:]
+        times.append((time.process_time() - processor, time.perf_counter() - wall))
+        ends.append(port.Eval(context).end_time)
+    return [cost for cost, grown in zip(times, np.diff(ends), strict=True) if grown][2:]
 
 
 def smoother_alone(robot: str, gait: str, seconds: float) -> Diagram:
     """Returns a smoother of a plan that is there already."""
-    motion = generate_motion(
-        pretrained_motion_model(robot), parse_label(gait), seconds, 0
-    )
+    writer, model = pretrained_motion_model(robot), get_robot(robot)
+    motion = generate_motion(writer, parse_label(gait), seconds, 0)
     builder = DiagramBuilder()
-    model = get_robot(robot)
     player = builder.AddSystem(PlanPlayer(model, plan_from_motion(model, motion)))
     smoother = builder.AddSystem(ToppraSmoother(model))
     builder.Connect(player.GetOutputPort("plan"), smoother.GetInputPort("plan"))
@@ -67,12 +64,8 @@ def smoother_alone(robot: str, gait: str, seconds: float) -> Diagram:
 
 def row(name: str, times: Times) -> str:
     """Returns a row of the table: medians and maxima in ms."""
-    cells = []
-    for column in zip(*times, strict=True):
-        cells += [
-            f"{1000 * statistics.median(column):.1f}",
-            f"{1000 * max(column):.1f}",
-        ]
+    columns = list(zip(*times, strict=True))
+    cells = [f"{1000 * f(of):.1f}" for of in columns for f in (statistics.median, max)]
     return f"| {name}, {len(times)} times | {' | '.join(cells)} |"
 
 
