@@ -67,15 +67,9 @@ class Rollout:
 
 
 class Recorder:
-    """A locomotion diagram that logs its ports, for any number of episodes.
+    """A locomotion ``diagram`` with a ``simulator`` that logs its ports.
 
-    Args:
-        scenario: what to simulate.
-        meshcat: where to draw it, if anywhere.
-
-    Attributes:
-        diagram: has the ports of a locomotion diagram.
-        simulator: of ``diagram``.
+    One diagram serves for any number of episodes. With ``meshcat`` it is drawn.
     """
 
     def __init__(self, scenario: Scenario, meshcat: Meshcat | None = None) -> None:
@@ -109,11 +103,11 @@ class Recorder:
         """Simulates until ``duration`` or a fall; call :meth:`start` first.
 
         Args:
-            duration: context time in s to stop at.
-            after_step: called after each control period, with the context's time.
+            duration: context time to stop at, s.
+            after_step: called after each control period with the context's time, s.
 
         Returns:
-            What happened, and the seconds spent inside AdvanceTo.
+            The record, and the wall time spent inside AdvanceTo, s.
         """
         steps = round(duration / PLAN_DT)
         wall, done = 0.0, 0
@@ -186,25 +180,19 @@ def base_errors(rollout: Rollout) -> tuple[float, float]:
     The distance is Euclidean, the angle that of the rotation between the two; the mean
     is over all samples.
     """
+    own, plan = rollout.state, rollout.plan_state
     samples = round(WINDOW / PLAN_DT)
-    squares = []
-    for first in range(0, len(rollout.state), samples):
-        own = rollout.state[first : first + samples]
-        plan = rollout.plan_state[first : first + samples]
-        q_own, q_plan = own[ORIENTATION], plan[ORIENTATION]
-        turn = yaw_quat(yaw_of(q_own[0]) - yaw_of(q_plan[0]))
-        p_plan = quat_rotate(turn, (plan - plan[0])[POSITION])
-        p_plan[:, 2] = plan[:, HEIGHT]
-        p_own = (own - own[0])[POSITION]
-        p_own[:, 2] = own[:, HEIGHT]
-        rotation = quat_error(q_own, quat_multiply(turn[None], q_plan))
-        squares.append(
-            np.stack(
-                (((p_own - p_plan) ** 2).sum(axis=1), (rotation**2).sum(axis=1)), axis=1
-            )
-        )
-    means = np.concatenate(squares).mean(axis=0)
-    return float(np.sqrt(means[0])), float(np.sqrt(means[1]))
+    start = np.arange(len(own)) // samples * samples  # of each sample's window
+    q_own, q_plan = own[ORIENTATION], plan[ORIENTATION]
+    turn = yaw_quat((yaw_of(q_own) - yaw_of(q_plan))[start])
+    p_plan = quat_rotate(turn, (plan - plan[start])[POSITION])
+    p_plan[:, 2] = plan[:, HEIGHT]
+    p_own = (own - own[start])[POSITION]
+    p_own[:, 2] = own[:, HEIGHT]
+    rotation = quat_error(q_own, quat_multiply(turn, q_plan))
+    squares = [(error**2).sum(axis=1) for error in (p_own - p_plan, rotation)]
+    position, orientation = np.sqrt(np.stack(squares, axis=1).mean(axis=0)).tolist()
+    return position, orientation
 
 
 def stretch(rollout: Rollout) -> float:

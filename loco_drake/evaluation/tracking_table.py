@@ -82,7 +82,7 @@ class _Runner:
         self._robot = get_robot(scenario.robot)
         self._randomization = randomization
         self._recorder = Recorder(scenario)
-        self._retargeter: SegmentRetargeter | None = None
+        self._retarget = SegmentRetargeter(self._robot)
         # The first step sets up torch.
         self._recorder.start()
         self._recorder.run(PLAN_DT)
@@ -108,13 +108,10 @@ class _Runner:
         )
 
     def _plan(self, segment: Segment) -> Any:
-        if self._retargeter is None:
-            self._retargeter = SegmentRetargeter(self._robot)
-        result = self._retargeter(segment)
+        result = self._retarget(segment)
         if isinstance(result, str):
             raise InputError(f"{segment.name} cannot be retargeted: {result}")
-        _, motion, _ = result
-        return plan_from_motion(self._robot, motion)
+        return plan_from_motion(self._robot, result[1])
 
 
 def generated_trials(
@@ -150,11 +147,11 @@ def run_trials(
     """Simulates trials and yields their results in order.
 
     Args:
-        scenario: with a generated reference, or a PlanReference where the trials have
-            segments.
-        trials: all of one kind.
-        workers: processes.
-        randomization: what each trial's world is drawn from, by its label and seed.
+        scenario: scenario with a generated reference, or a PlanReference if the trials
+            have segments.
+        trials: trials, all of one kind.
+        workers: number of processes.
+        randomization: distribution of each trial's world, by its label and seed.
     """
     randomization = randomization or RandomizationConfig()
     randomization.check(get_robot(scenario.robot), scenario.plant)
@@ -167,13 +164,12 @@ def run_trials(
 
 def summarize(episodes: Sequence[Episode]) -> dict[str, Any]:
     """Returns ``{"labels": {LABEL: figures}, "all": figures, "real_time_factor"}``."""
-    labels = list(dict.fromkeys(episode.trial.label for episode in episodes))
+    by_label: dict[str, list[Episode]] = {}
+    for episode in episodes:
+        by_label.setdefault(episode.trial.label, []).append(episode)
     simulated = sum((episode.samples - 1) * PLAN_DT for episode in episodes)
     return {
-        "labels": {
-            label: figures([e for e in episodes if e.trial.label == label])
-            for label in labels
-        },
+        "labels": {label: figures(own) for label, own in by_label.items()},
         "all": figures(episodes),
         "real_time_factor": simulated / sum(episode.wall for episode in episodes),
     }

@@ -115,7 +115,6 @@ class Content:
     table_1: dict[str, list[list[int]]] = field(default_factory=dict)
     sources: dict[str, str] = field(default_factory=dict)
     comparisons: dict[str, str] = field(default_factory=dict)
-    linear: dict[str, float] = field(default_factory=dict)
     clips: dict[str, float] = field(default_factory=dict)
     parts: list[Part] = field(default_factory=list)
     results: list[Result] = field(default_factory=list)

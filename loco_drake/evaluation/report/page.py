@@ -64,11 +64,11 @@ def build_report(
     """Returns the page of a folder of results, and what it holds, as JSON.
 
     Args:
-        folder: as :func:`.results.load_results` reads it.
-        labels: of the replays, for each robot; may be empty.
-        seconds: of each replay.
-        seed: of the motion shown.
-        say: is told what goes on.
+        folder: folder of results, see :func:`.results.load_results`.
+        labels: labels of the replays for each robot; may be empty.
+        seconds: duration of each replay.
+        seed: seed of the motion shown.
+        say: receives messages about the progress.
 
     Raises:
         InputError: if a result is damaged, or a label is unknown.
@@ -77,18 +77,16 @@ def build_report(
         parse_label(label)
     results = load_results(folder)
     shown = of_results(results)
-    for name in ROBOTS:
-        trained = load_actor(
-            policy_path(get_robot(name)), get_robot(name)
-        ).config.labels
+    for robot in map(get_robot, ROBOTS):
+        trained = load_actor(policy_path(robot), robot).config.labels
         for label in labels:
-            check_choice(f"gait of the {name}'s policy", label, trained)
+            check_choice(f"gait of the {robot.name}'s policy", label, trained)
     say("Generating motion of each gait")
-    motions = {robot: _motions(robot, seed) for robot in ROBOTS}
+    motions = {name: _motions(name, seed) for name in ROBOTS}
     replays: list[Replay] = []
-    for robot in ROBOTS if labels else ():
-        for replay in record_replays(robot, labels, seconds, seed):
-            say(f"Simulated {robot}, {replay.label}")
+    for name in ROBOTS if labels else ():
+        for replay in record_replays(name, labels, seconds, seed):
+            say(f"Simulated {name}, {replay.label}")
             replays.append(replay)
     return _render(shown, motions, replays), {
         "goals": shown["counts"],
@@ -170,11 +168,8 @@ def record_replays(
 ) -> Iterator[Replay]:
     """Simulates the shipped policy on generated motion, one gait after another.
 
-    Args:
-        robot: one that a policy is shipped for.
-        labels: that the policy was trained on; at least one.
-        seconds: of each, at most.
-        seed: of the generated motion.
+    A replay lasts ``seconds``, or until the robot falls. There is at least one label,
+    and the policy was trained on each.
     """
     scenario = Scenario(
         robot=robot,

@@ -106,15 +106,9 @@ def gaits_picture(motions: Mapping[str, Sequence[Motion]]) -> tuple[Figure, str]
             draw_strip(cell, get_robot(name), motion, near=(color, color), ink=INK)
             cell.set_ylim(-0.03, 0.43)
             if column == 0:
-                cell.text(
-                    -0.01,
-                    0.4,
-                    str(motion.label),
-                    transform=cell.transAxes,
-                    ha="right",
-                    color=color,
-                    weight="bold",
-                )
+                style = {"ha": "right", "color": color, "weight": "bold"}
+                where = {"transform": cell.transAxes}
+                cell.text(-0.01, 0.4, str(motion.label), **where, **style)
     alt = (
         f"Outlines of {' and '.join(robots)} every tenth of a second in "
         f"{count} generated gaits, from "
@@ -184,33 +178,22 @@ def returns_picture(tracking: Mapping[str, Figures]) -> tuple[Figure, str]:
         found = dict(figures.parts("labels"))
         for x, label in enumerate(labels):
             part = found.get(label)
-            value = part.required("normalized_return") if part else None
-            if part is None or value is None:
+            if part is None or (value := part.required("normalized_return")) is None:
                 continue
             at = x + (place - (len(tracking) - 1) / 2) * width
             axes.bar(at, value, 0.9 * width, color=ROBOT_COLORS[robot])
             worst = part.number("normalized_return_worst")
             if worst is not None:
                 axes.plot([at], [worst], "_", color=INK, ms=9, mew=2)
-            high = value > _TALL
-            axes.text(
-                at,
-                2 if high else value + 1,
-                f"{value:.0f}",
-                ha="center",
-                size=8,
-                color="white" if high else INK,
-            )
+            height, color = (2, "white") if value > _TALL else (value + 1, INK)
+            text = f"{value:.0f}"
+            axes.text(at, height, text, ha="center", size=8, color=color)
         name = robot_title(robot)
         axes.bar([np.nan], [np.nan], color=ROBOT_COLORS[robot], label=name)
     axes.plot([], [], "_", color=INK, ms=9, mew=2, label="worst episode")
+    goals = {goal.title: goal for own in CONTENT.goals.values() for goal in own}
     for what, title in _AIMS.items():
-        (aim,) = (
-            goal.aim.least
-            for goals in CONTENT.goals.values()
-            for goal in goals
-            if goal.title == title
-        )
+        aim = goals[title].aim.least
         axes.axhline(aim, color=FAINT, ls="--", lw=1, zorder=0)
         axes.text(len(labels) - 0.45, aim, what, va="bottom", color=FAINT, size=8)
     axes.set_xticks(range(len(labels)), labels, rotation=35, ha="right")

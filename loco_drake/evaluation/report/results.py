@@ -6,6 +6,7 @@ sentence.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,9 @@ class ResultFile:
         return "-".join(filter(None, (kind, *self.robots, condition))) + ".json"
 
 
+_TRACKING = "loco-drake evaluate tracking --robot"
+
+
 def tracking_name(condition: str, policy: str = "") -> str:
     """Returns the name of the results of a shipped policy under a condition."""
     of_policy = f"{policy}_policy" if policy else ""
@@ -48,25 +52,23 @@ def tracking_name(condition: str, policy: str = "") -> str:
 
 
 def _expected() -> Iterator[ResultFile]:
-    start = "loco-drake"
     for result in CONTENT.results:
         each = [(robot,) for robot in ROBOTS]
         for robots in each if "{robot}" in result.command else [ROBOTS]:
-            command = f"{start} {result.command.format(robot=robots[0])}"
+            command = f"loco-drake {result.command.format(robot=robots[0])}"
             yield ResultFile(result.name, robots, command, holds=result.holds)
     for policy in CONTENT.policies:
-        asked = f"--policy {policy.name}" if policy.name else ""
-        for robot in policy.robots:
-            for name in CONTENT.worlds if policy.name else CONTENT.conditions:
-                options = CONTENT.conditions[name].options
-                flags = [o for o in options.split() if o in ("--randomize", "--pushes")]
-                line = ("evaluate tracking --robot", robot, asked, options)
-                yield ResultFile(
-                    tracking_name(name, policy.name),
-                    (robot,),
-                    " ".join(filter(None, (start, *line))),
-                    " ".join(filter(None, (asked, *flags))),
-                )
+        asked = ["--policy", policy.name] if policy.name else []
+        names = CONTENT.worlds if policy.name else CONTENT.conditions
+        for robot, name in product(policy.robots, names):
+            options = CONTENT.conditions[name].options.split()
+            flags = [o for o in options if o in ("--randomize", "--pushes")]
+            yield ResultFile(
+                tracking_name(name, policy.name),
+                (robot,),
+                " ".join((_TRACKING, robot, *asked, *options)),
+                " ".join((*asked, *flags)),
+            )
 
 
 EXPECTED = tuple(_expected())
@@ -128,12 +130,11 @@ class Figures:
 
     def numbers(self, *keys: str) -> list[float | None]:
         """Returns the list of numbers, or nulls, that ``keys`` lead to."""
-        within, last = self.part(*keys[:-1]), keys[-1]
-        values = within.values.get(last)
+        values = self.part(*keys[:-1]).values.get(keys[-1])
         if not isinstance(values, list):
             raise self.damaged(f"{'.'.join(keys)} is no list")
-        named = {str(place): value for place, value in enumerate(values)}
-        return [Figures(named, self.origin).number(place) for place in named]
+        named = Figures({str(k): v for k, v in enumerate(values)}, self.origin)
+        return list(map(named.number, named.values))
 
     def text(self, key: str) -> str:
         """Returns a string, empty where there is none."""
@@ -177,11 +178,9 @@ class Results:
     absent: dict[tuple[str, str], str]
 
     def of(self, name: str, robot: str) -> Figures | None:
-        """Returns the figures of a robot, e.g. of "tokenizer", if there are any.
+        """Returns the figures of a robot, if there are any.
 
-        Args:
-            name: of the file, without robot and suffix, such as "tracking-generated".
-            robot: its name.
+        ``name`` is that of the file without robot and suffix: "tracking-generated".
         """
         files = [file.path for file in EXPECTED if file.name == name]
         found = (self.found.get(path, {}).get(robot) for path in files)
@@ -209,14 +208,11 @@ def load_results(folder: Path) -> Results:
         raise InputError(
             f"There is no folder of results {str(folder)!r}; it is to hold {names}."
         )
-    found, missing = {}, []
+    missing = [file for file in EXPECTED if not (folder / file.path).is_file()]
+    found: dict[str, dict[str, Figures]] = {}
     absent: dict[tuple[str, str], str] = {}
-    for file in EXPECTED:
-        path = folder / file.path
-        if not path.is_file():
-            missing.append(file)
-            continue
-        found[file.path] = by_robot = _by_robot(path, file)
+    for file in (file for file in EXPECTED if file not in missing):
+        found[file.path] = by_robot = _by_robot(folder / file.path, file)
         for robot in file.robots:
             if robot not in by_robot:
                 absent[file.path, robot] = "the file has no figures of this robot"
@@ -268,7 +264,7 @@ def _command(file: ResultFile, results: Results) -> str:
     if not file.name.startswith("tracking-") or not found:
         return file.command
     (figures,) = found.values()
-    options = [f"--robot {file.robots[0]}"]
+    options = [file.robots[0]]
     for key, option, default in _OPTIONS:
         text = isinstance(default, str)
         value = figures.text(key) if text else figures.number(key)
@@ -277,4 +273,4 @@ def _command(file: ResultFile, results: Results) -> str:
     counts = [part.number("episodes") or 0.0 for _, part in figures.parts("labels")]
     seeds = max(counts, default=0.0)
     options += filter(None, (file.flags, f"--seeds {seeds:.0f}" if seeds else ""))
-    return f"loco-drake evaluate tracking {' '.join(options)}"
+    return " ".join((_TRACKING, *options))

@@ -1,13 +1,14 @@
 """The tables of each part of the pipeline, for all robots that have results."""
 
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from itertools import product
 from typing import Any
 
 from loco_drake.control.actor import load_actor
 from loco_drake.evaluation.report.content import CONTENT
 from loco_drake.evaluation.report.results import Figures, Results, tracking_name
 from loco_drake.evaluation.report.tables import (
-    NOT_MEASURED,
     NOTHING,
     Cell,
     Row,
@@ -17,6 +18,7 @@ from loco_drake.evaluation.report.tables import (
     number,
     recognition_tables,
     robot_title,
+    robots_table,
 )
 from loco_drake.generation.generator import load_generator
 from loco_drake.generation.tokenizer import load_tokenizer
@@ -25,6 +27,7 @@ from loco_drake.models.shipped import policy_path, pretrained_path
 from loco_drake.motion.motion import FPS
 
 _COLUMNS = CONTENT.columns
+_TRACKING = tuple(column.title for column in _COLUMNS["tracking"])
 
 
 def all_tables(results: Results) -> dict[str, Any]:
@@ -34,29 +37,17 @@ def all_tables(results: Results) -> dict[str, Any]:
         InputError: if a result is damaged.
     """
     generation = results.of_robots("generation")
+
+    def by_robot(name: str, table: Callable[[str, Figures], Table]) -> list[Table]:
+        return [table(robot, own) for robot, own in results.of_robots(name).items()]
+
     return {
-        "retargeting": [
-            label_table(_by_gait(robot), _COLUMNS["retargeting"], figures)
-            for robot, figures in results.of_robots("retargeting").items()
-        ],
-        "tokenizer": [
-            tokenizer_table(robot, figures)
-            for robot, figures in results.of_robots("tokenizer").items()
-        ],
+        "retargeting": by_robot("retargeting", retargeting_table),
+        "tokenizer": by_robot("tokenizer", tokenizer_table),
         "recognition": recognition_tables(generation) if generation else None,
         "realism": realism_table(generation) if generation else None,
-        "generation": [
-            generation_table(robot, figures) for robot, figures in generation.items()
-        ],
-        "tracking": [
-            label_table(
-                _by_gait(robot),
-                _COLUMNS["tracking"] + _COLUMNS["tracking_more"],
-                figures,
-                conditions_text(figures),
-            )
-            for robot, figures in results.of_robots("tracking-generated").items()
-        ],
+        "generation": by_robot("generation", generation_table),
+        "tracking": by_robot("tracking-generated", tracking_table),
         "robustness": robustness_table(results),
         "policies": policies_table(results),
     }
@@ -66,34 +57,38 @@ def _by_gait(robot: str) -> str:
     return f"{robot_title(robot)}, by gait"
 
 
+def retargeting_table(robot: str, figures: Figures) -> Table:
+    """Returns the figures of retargeting, by label."""
+    return label_table(_by_gait(robot), _COLUMNS["retargeting"], figures)
+
+
+def tracking_table(robot: str, figures: Figures) -> Table:
+    """Returns the figures of tracking, by label, and how they were measured."""
+    columns = _COLUMNS["tracking"] + _COLUMNS["tracking_more"]
+    return label_table(_by_gait(robot), columns, figures, conditions_text(figures))
+
+
 def tokenizer_table(robot: str, figures: Figures) -> Table:
     """Returns errors by label, of recordings held out and of those for training."""
     columns = _COLUMNS["tokenizer"]
     table = label_table(_by_gait(robot), columns, figures)
     use = figures.required("codebook_use")
-    note = "" if use is None else f"Codes in use: {100 * use:.1f} %."
     if figures.values.get("train") is None:
         return table
     seen = label_table("", columns, figures.part("train"))
     by_title = {row.title: row.cells for row in seen.rows}
     nothing = (Cell(NOTHING),) * len(columns)
-    rows = tuple(
-        Row(row.title, row.cells + by_title.get(row.title, nothing), row.total)
-        for row in table.rows
-    )
-    added = (title.replace("held out", "training") for title in seen.columns)
-    return Table(table.title, table.first, (*table.columns, *added), rows, note)
+    added = [by_title.get(row.title, nothing) for row in table.rows]
+    titles = (title.replace("held out", "training") for title in seen.columns)
+    note = "" if use is None else f"Codes in use: {100 * use:.1f} %."
+    return replace(table.beside(titles, added), note=note)
 
 
 def generation_table(robot: str, figures: Figures) -> Table:
     """Returns how sound generated motion is, by label."""
     table = label_table(_by_gait(robot), _COLUMNS["generation"], figures)
-    rows = tuple(
-        Row(row.title, (*row.cells, _drift(figures, row)), row.total)
-        for row in table.rows
-    )
-    columns = (*table.columns, "drift over 60 s, and of what")
-    return Table(table.title, table.first, columns, rows)
+    drifts = [(_drift(figures, row),) for row in table.rows]
+    return table.beside(("drift over 60 s, and of what",), drifts)
 
 
 def _drift(figures: Figures, row: Row) -> Cell:
@@ -104,9 +99,8 @@ def _drift(figures: Figures, row: Row) -> Cell:
         value = figures.number("drift_60s")
         return Cell(NOTHING if value is None else number(value, 2))
     labels = figures.part("drift", "labels")
-    if row.title not in labels.values:
-        return Cell(NOTHING)
-    worst = labels.extreme(max, "drift", row.title)
+    known = row.title in labels.values
+    worst = labels.extreme(max, "drift", row.title) if known else None
     if worst is None:
         return Cell(NOTHING)
     value, what = worst
@@ -116,31 +110,19 @@ def _drift(figures: Figures, row: Row) -> Cell:
 
 def realism_table(robots: dict[str, Figures]) -> Table:
     """Returns what tells generated motion from recordings, robots side by side."""
-    rows = []
-    for column in _COLUMNS["realism"]:
-        theirs = CONTENT.clips.get(column.key)
-        shown = NOT_MEASURED if theirs is None else f"{theirs:.3f}"
-        cells = (column_cell(column, figures) for figures in robots.values())
-        rows.append(Row(column.title, (Cell(shown), *cells)))
-    columns = ("paper's clips", *map(robot_title, robots))
-    return Table("Real or generated? New or copied?", "figure", columns, tuple(rows))
+    title = "Real or generated? New or copied?"
+    return robots_table(title, "figure", _COLUMNS["realism"], robots, clips=True)
 
 
 def robustness_table(results: Results) -> Table | None:
     """Returns tracking under all conditions, robot by robot."""
     rows = []
-    for robot in ROBOTS:
-        for name, condition in CONTENT.conditions.items():
-            figures = results.of(tracking_name(name), robot)
-            if figures is not None:
-                cells = (
-                    *_whole_cells(figures),
-                    _worst(figures),
-                    Cell(conditions_text(figures)),
-                )
-                rows.append(Row(f"{robot_title(robot)}, {condition.title}", cells))
-    titles = (column.title for column in _COLUMNS["tracking"])
-    columns = (*titles, "worst gait", "measured on")
+    for robot, (name, condition) in product(ROBOTS, CONTENT.conditions.items()):
+        if (figures := results.of(tracking_name(name), robot)) is not None:
+            more = _worst(figures), Cell(conditions_text(figures))
+            cells = (*_whole_cells(figures), *more)
+            rows.append(Row(f"{robot_title(robot)}, {condition.title}", cells))
+    columns = (*_TRACKING, "worst gait", "measured on")
     title = "All gaits together, by condition"
     return Table(title, "condition", columns, tuple(rows)) if rows else None
 
@@ -151,37 +133,24 @@ def policies_table(results: Results) -> Table | None:
     So it says what randomization in training costs and brings, and what a policy loses
     that does without privileged observations.
     """
+    worlds = CONTENT.worlds
     rows = []
-    for robot in ROBOTS:
-        for policy in CONTENT.policies:
-            found = [
-                results.of(tracking_name(world, policy.name), robot)
-                for world in CONTENT.worlds
-            ]
-            if any(found):
-                cells = tuple(
-                    cell for figures in found for cell in _whole_cells(figures)
-                )
-                rows.append(Row(f"{robot_title(robot)}, {policy.title}", cells))
-    return (
-        Table(
-            "Policies in both worlds",
-            "policy",
-            tuple(c.title for c in _COLUMNS["tracking"]) * len(CONTENT.worlds),
-            tuple(rows),
-            groups=tuple(CONTENT.worlds.values()),
-        )
-        if rows
-        else None
-    )
+    for robot, policy in product(ROBOTS, CONTENT.policies):
+        found = [results.of(tracking_name(k, policy.name), robot) for k in worlds]
+        if any(found):
+            cells = tuple(cell for figures in found for cell in _whole_cells(figures))
+            rows.append(Row(f"{robot_title(robot)}, {policy.title}", cells))
+    columns, groups = _TRACKING * len(worlds), tuple(worlds.values())
+    title = "Policies in both worlds"
+    table = Table(title, "policy", columns, tuple(rows), groups=groups)
+    return table if rows else None
 
 
 def _whole_cells(figures: Figures | None) -> tuple[Cell, ...]:
-    columns = _COLUMNS["tracking"]
     if figures is None:
-        return (Cell(NOTHING),) * len(columns)
+        return (Cell(NOTHING),) * len(_TRACKING)
     whole = figures.part("all")
-    return tuple(column_cell(column, whole) for column in columns)
+    return tuple(column_cell(column, whole) for column in _COLUMNS["tracking"])
 
 
 def _worst(figures: Figures) -> Cell:

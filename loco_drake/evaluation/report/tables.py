@@ -1,7 +1,7 @@
 """Tables of the report as text, ready for layout."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
 
 from loco_drake.evaluation.report.content import CONTENT, Column
 from loco_drake.evaluation.report.goals import Measured, read_measured
@@ -10,7 +10,6 @@ from loco_drake.motion.gaits import LABELS
 
 NOTHING = "–"
 NOT_MEASURED = "not measured"  # of what others released
-Theirs = Callable[[str, str], "Cell"]  # what is known, of a source and a comparison
 _TITLES = {"go2": "Go2", "a1": "A1"}
 
 
@@ -57,6 +56,16 @@ class Table:
                 if reason:
                     rows.setdefault(reason, []).append(row.title)
         return [f"{', '.join(titles)}: {reason}" for reason, titles in rows.items()]
+
+    def beside(
+        self, columns: Iterable[str], cells: Iterable[tuple[Cell, ...]]
+    ) -> "Table":
+        """Returns the table with further columns, their cells row by row."""
+        rows = tuple(
+            replace(row, cells=row.cells + more)
+            for row, more in zip(self.rows, cells, strict=True)
+        )
+        return replace(self, columns=(*self.columns, *columns), rows=rows)
 
 
 def number(value: float, digits: int) -> str:
@@ -109,36 +118,49 @@ def figures_table(
     note: str = "",
 ) -> Table:
     """Returns figures by the titles of their rows; a row "all" is a total."""
-    return Table(
-        title,
-        first,
-        tuple(column.title for column in columns),
-        tuple(
-            Row(name, tuple(column_cell(c, own) for c in columns), name == "all")
-            for name, own in rows.items()
-        ),
-        note,
+    titles = tuple(column.title for column in columns)
+    entries = tuple(
+        Row(name, tuple(column_cell(c, own) for c in columns), name == "all")
+        for name, own in rows.items()
     )
+    return Table(title, first, titles, entries, note)
 
 
 def label_table(
     title: str, columns: Sequence[Column], figures: Figures, note: str = ""
 ) -> Table:
-    """Returns the figures of one robot, label by label, and of all labels.
-
-    Args:
-        title: over the table.
-        columns: to show.
-        figures: with "labels" and "all".
-        note: below the table.
-    """
+    """Returns the figures of one robot, label by label, and of all labels."""
     found = dict(figures.parts("labels"))
-    known = {str(label): found[str(label)] for label in LABELS if str(label) in found}
+    known = {label: found[label] for label in map(str, LABELS) if label in found}
     rows = {**known, "all": figures.part("all")}
     return figures_table(title, "gait", columns, rows, note)
 
 
-def recognition_tables(generation: dict[str, Figures]) -> dict[str, Table]:
+def robots_table(
+    title: str,
+    first: str,
+    rows: Sequence[Column],
+    robots: Mapping[str, Figures],
+    *,
+    clips: bool = False,
+) -> Table:
+    """Returns a row for each figure: of the paper's clips, if asked, and each robot."""
+    entries = []
+    for row in rows:
+        cells = [of_clips(row.key)] if clips else []
+        cells += [column_cell(row, own) for own in robots.values()]
+        entries.append(Row(row.title, tuple(cells)))
+    columns = ("paper's clips",) * clips + tuple(map(robot_title, robots))
+    return Table(title, first, columns, tuple(entries))
+
+
+def of_clips(key: str) -> Cell:
+    """Returns a figure of generation of the paper's clips."""
+    value = CONTENT.clips.get(key)
+    return Cell(NOT_MEASURED if value is None else f"{value:.3f}")
+
+
+def recognition_tables(generation: Mapping[str, Figures]) -> dict[str, Table]:
     """Returns what classifiers recognized, figures by robot, as three tables.
 
     "transformer" is Table 1 of the paper, a row for each source; "linear" the same by a
@@ -146,55 +168,34 @@ def recognition_tables(generation: dict[str, Figures]) -> dict[str, Table]:
     is left when there are no more samples than real.
     """
 
-    def published(source: str, comparison: str) -> Cell:
-        entry = CONTENT.published(source, comparison)
-        return figure_cell(Measured(entry.mean, entry.low, entry.high))
+    def cells(kind: str, source: str) -> Iterator[Cell]:
+        for comparison in CONTENT.comparisons:
+            key = f"classifiers.{kind}.{comparison}.{source}.mean"
+            published = Measured(*astuple(CONTENT.published(source, comparison)))
+            yield figure_cell(published) if kind == "transformer" else of_clips(key)
+            for own in generation.values():
+                none = "there is no motion of this source"
+                yield column_cell(Column(key=key), own, none)
 
-    def of_clips(source: str, comparison: str) -> Cell:
-        known = source == "all"
-        return Cell(f"{CONTENT.linear[comparison]:.3f}" if known else NOT_MEASURED)
-
-    def recognized(figures: Figures, *keys: str, otherwise: str = "") -> Cell:
-        column = Column(key=".".join(("classifiers", *keys, "mean")))
-        return column_cell(column, figures, otherwise)
-
-    def table_1(title: str, kind: str, whose: str, theirs: Theirs) -> Table:
-        def cells(source: str) -> Iterable[Cell]:
-            for comparison in CONTENT.comparisons:
-                yield theirs(source, comparison)
-                for own in generation.values():
-                    none = "there is no motion of this source"
-                    yield recognized(own, kind, comparison, source, otherwise=none)
-
+    def table_1(kind: str, title: str, whose: str) -> Table:
         return Table(
             f"{title}, share of trajectories recognized",
             "source",
-            (whose, *robots) * len(CONTENT.comparisons),
+            (whose, *map(robot_title, generation)) * len(CONTENT.comparisons),
             tuple(
-                Row(name, tuple(cells(source)), total=source == "all")
+                Row(name, tuple(cells(kind, source)), total=source == "all")
                 for source, name in CONTENT.sources.items()
             ),
             groups=tuple(CONTENT.comparisons.values()),
         )
 
-    robots = tuple(map(robot_title, generation))
-    linear = "Linear classifier on summaries"
     return {
-        "transformer": table_1("Transformer", "transformer", "paper", published),
-        "linear": table_1(linear, "linear", "paper's clips", of_clips),
-        "matched": Table(
+        "transformer": table_1("transformer", "Transformer", "paper"),
+        "linear": table_1("linear", "Linear classifier on summaries", "paper's clips"),
+        "matched": robots_table(
             "Diversity, from as many generated trajectories as there are recorded ones",
             "classifier",
-            robots,
-            tuple(
-                Row(
-                    kind,
-                    tuple(
-                        recognized(own, kind, "generated_to_real_matched", "all")
-                        for own in generation.values()
-                    ),
-                )
-                for kind in ("transformer", "linear")
-            ),
+            CONTENT.columns["matched"],
+            generation,
         ),
     }
