@@ -107,10 +107,9 @@ def retargeting(
     """
     segment = select_labels(read_segments(data_dir(data)), [label])[stretch]
     clip = segment.read()
-    resampled = resample(clip, FPS)
-    points = np.concatenate(
-        (resampled.toes, resampled.withers[:, None], resampled.hip[:, None]), axis=1
-    )
+    moved = resample(clip, FPS)
+    trunk = moved.withers[:, None], moved.hip[:, None]
+    points = np.concatenate((moved.toes, *trunk), axis=1)
     # All are at x = 0 at the time of the picture.
     frame = round(time * FPS)
     points[..., 0] -= points[frame, 4:, 0].mean()
@@ -165,8 +164,7 @@ def retargeting(
     meshcat.PublishRecording()
     with atomic_path(html) as temporary:
         temporary.write_text(meshcat.StaticHtml())
-    size_mb = html.stat().st_size / 1e6
-    print(f"{html}: {size_mb:.1f} MB, {(last - first) / FPS:.1f} s")
+    print(f"{html}: {html.stat().st_size / 1e6:.1f} MB, {(last - first) / FPS:.1f} s")
 
 
 def gait_change(

@@ -77,25 +77,20 @@ def principal_components(rows: Array, count: int = 2) -> tuple[Array, Array]:
 def library_figure(points: Iterable[MotionPoint], title: str) -> Figure:
     """Returns a figure of four plots: seconds, gait timing, duty factor, an embedding.
 
-    Colours stand for sources and markers for gaits; validation is hollow.
-
-    Args:
-        points: of motions with one of the fifteen labels.
-        title: above all.
+    All motions have one of the fifteen labels. Colours stand for sources and markers
+    for gaits; validation is hollow.
     """
     points = list(points)
     figure = Figure(figsize=(12, 9), layout="constrained")
     figure.suptitle(title)
     seconds, rhythm, duty, embedding = figure.subplots(2, 2).flat
     _draw_seconds(seconds, points)
-    strides = [p for p in points if p.stride_period is not None]
-    for axes, key, name in (
-        (rhythm, "stride_period", "stride period [s]"),
-        (duty, "duty_factor", "duty factor"),
-    ):
-        for point in strides:
-            _mark(axes, point, np.array([[point.speed, getattr(point, key)]]))
-        axes.set(xlabel="speed [m/s]", ylabel=name)
+    for point in points:
+        if point.stride_period is not None and point.duty_factor is not None:
+            _mark(rhythm, point, np.array([[point.speed, point.stride_period]]))
+            _mark(duty, point, np.array([[point.speed, point.duty_factor]]))
+    rhythm.set(xlabel="speed [m/s]", ylabel="stride period [s]")
+    duty.set(xlabel="speed [m/s]", ylabel="duty factor")
     with_rows = [p for p in points if len(p.embedding)]
     counts = [len(p.embedding) for p in with_rows]
     if sum(counts) > 2:
@@ -139,9 +134,9 @@ def _mark(axes: Axes, point: MotionPoint, xy: Array) -> None:
     axes.scatter(
         xy[:, 0],
         xy[:, 1],
+        s=22,
         marker=MARKERS[point.label.gait],
         facecolor=color if point.side == TRAIN else "none",
         edgecolor=color,
-        s=22,
         linewidth=0.8,
     )

@@ -55,12 +55,10 @@ def peaks(motion: Motion) -> dict[str, float]:
 def roughness(
     motion: Motion, time: float, steady: Iterable[Motion]
 ) -> dict[str, float]:
-    """Returns the peaks about a gait change relative to steady gaits.
+    """Returns the peaks of a motion about a gait change relative to steady gaits.
 
-    Args:
-        motion: changes its gait.
-        time: when it does, in s, not at its ends.
-        steady: motions of the gaits before and after.
+    ``time`` is that of the change in s, not at the motion's ends; ``steady`` are
+    motions of the gaits before and after.
     """
     first = round((time - AROUND / 2) * motion.fps)
     last = round((time + AROUND / 2) * motion.fps)

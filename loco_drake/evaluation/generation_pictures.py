@@ -16,6 +16,7 @@ from loco_drake.common.rotations import (
 )
 from loco_drake.evaluation.recognition import Recognition
 from loco_drake.evaluation.recorded import Recorded
+from loco_drake.evaluation.samples import by_label
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import Motion
@@ -65,12 +66,9 @@ def confusion_figure(recognition: Recognition, title: str) -> Figure:
 def draw_confusions(
     figure: Figure, matrices: Mapping[str, Array], labels: Sequence[str]
 ) -> None:
-    """Draws matrices, shape (labels, labels), side by side in an empty figure.
+    """Draws matrices by title, shape (labels, labels), side by side in an empty figure.
 
-    Args:
-        figure: to draw in.
-        matrices: by title: the share of each row that was taken for what.
-        labels: of rows and columns.
+    An entry is the share of its row that was taken for the label of its column.
     """
     count = len(labels)
     columns = figure.subplots(1, len(matrices), sharey=True)
@@ -92,9 +90,7 @@ def draw_confusions(
 def code_use_figure(counts: NDArray[np.int64], title: str) -> Figure:
     """Returns how often the codes of each codebook are used, the most used first.
 
-    Args:
-        counts: shape (codebooks, codebook_size).
-        title: of the picture.
+    The counts have the shape (codebooks, codebook_size).
     """
     figure = Figure(figsize=(8, 4.5), layout="constrained")
     axes = figure.add_subplot()
@@ -117,21 +113,13 @@ def motion_figure(
     A strip shows the robot from its left side every tenth of a second, with its left
     legs in front; the first motion of each label is shown.
     """
-    first_recorded = {str(m.label): m for m in reversed(recorded)}
-    first_generated = {str(m.label): m for m in reversed(generated)}
-    names = [
-        str(label)
-        for label in LABELS
-        if str(label) in first_recorded and str(label) in first_generated
-    ]
+    sides = {"recorded": by_label(recorded), "generated": by_label(generated)}
+    names = [k for k in map(str, LABELS) if all(k in side for side in sides.values())]
     figure = Figure(figsize=(14, 1.3 * len(names)), layout="constrained")
     axes = figure.subplots(len(names), 2, squeeze=False)
     for row, name in zip(axes, names, strict=True):
-        for cell, what, motion in (
-            (row[0], "recorded", first_recorded[name]),
-            (row[1], "generated", first_generated[name]),
-        ):
-            draw_strip(cell, robot, motion)
+        for cell, (what, side) in zip(row, sides.items(), strict=True):
+            draw_strip(cell, robot, side[name][0])
             cell.set_title(f"{name}, {what}", size=9)
     return figure
 
@@ -144,26 +132,17 @@ def draw_strip(
     near: tuple[str, str] = ("C0", "C1"),
     ink: str = "k",
 ) -> None:
-    """Draws poses side by side, as seen from the left, x forward.
+    """Draws poses of the first STRIP_SECONDS side by side, from the left, x forward.
 
-    Args:
-        axes: to draw in.
-        robot: whose outline it is.
-        motion: its first STRIP_SECONDS are shown.
-        near: colours of the left legs, front and rear; the right ones are grey.
-        ink: colour of the trunk.
+    ``near`` are the colours of the left legs, front and rear; the right ones are grey.
+    ``ink`` is that of the trunk.
     """
     frames = np.linspace(0, STRIP_SECONDS * motion.fps, POSES).round().astype(int)
     frames = np.minimum(frames, len(motion) - 1)
+    q = motion.joint_positions
     hips = np.broadcast_to(robot.p_BHip, (len(motion), 4, 3))
-    legs = [
-        _seen(motion, points)[frames]
-        for points in (
-            hips,
-            robot.knee_positions(motion.joint_positions),
-            robot.toe_positions(motion.joint_positions),
-        )
-    ]
+    points = (hips, robot.knee_positions(q), robot.toe_positions(q))
+    legs = [_seen(motion, p_B)[frames] for p_B in points]
     for place, (hip, knee, toe) in enumerate(zip(*legs, strict=True)):
         shift = np.array([place * SPACING, 0.0])
         for leg, color in ((1, "0.7"), (3, "0.7"), (0, near[0]), (2, near[1])):

@@ -48,16 +48,6 @@ from loco_drake.retargeting.scaling import AS_RECORDED, Variant
 
 Array = NDArray[np.float64]
 
-# Figures of which the worst clip is told beside the label's own.
-_WORST_OF_REPORT = (
-    "stance_slip_median_mps",
-    "penetration_max_m",
-    "joint_speed_ratio_max",
-    "toe_error_rmse_m",
-    "correction_rmse_m",
-    "trunk_correction_rmse_m",
-)
-_FIDELITY = ("stride_period_error", "phase_lag_error", "duty_factor_error")
 # The animal decides whether there are enough strides: a robot's motion can end a frame
 # before its clip, and a slower robot makes fewer strides.
 _ROBOT_STRIDES = 2
@@ -79,18 +69,14 @@ class GaitFidelity:
 NO_RHYTHM = GaitFidelity(
     stride_period_error=1.0, phase_lag_error=0.5, duty_factor_error=1.0
 )
+_FIDELITY = tuple(vars(NO_RHYTHM))
 
 
 def gait_fidelity(source: Track, robot: Track) -> GaitFidelity | None:
-    """Returns the errors of the robot's gait timing.
+    """Returns the errors of the robot's gait timing against the animal's.
 
-    Args:
-        source: of the animal.
-        robot: of the motion made of it.
-
-    Returns:
-        None if the animal makes fewer than three strides; :data:`NO_RHYTHM` if the
-        robot then makes fewer than two.
+    None if the animal makes fewer than three strides; :data:`NO_RHYTHM` if the robot
+    then makes fewer than two.
     """
     own = gait_timing(source)
     if own is None:
@@ -159,31 +145,19 @@ def score_segments(
 ) -> Iterator[ClipScore | FailedClip]:
     """Retargets segments, and yields the figures of each, in their order.
 
-    A process has only one clip at a time in memory.
-
-    Args:
-        segments: from :func:`loco_drake.datasets.segments.read_segments`.
-        robot: to move.
-        workers: processes.
-        variant: what to change of the recordings; the rhythm is compared with theirs
-            in the motion's time.
+    A process has only one clip at a time in memory. The rhythm of a variant is compared
+    with that of the recording in the motion's time.
     """
-    return map_in_workers(
-        partial(_Scorer, robot.definition, variant), segments, workers
-    )
+    make = partial(_Scorer, robot.definition, variant)
+    return map_in_workers(make, segments, workers)
 
 
 def summarize(scores: Sequence[ClipScore | FailedClip]) -> dict[str, Any]:
-    """Returns the figures of one robot: by label, of all, and of other labels.
+    """Returns what ``loco-drake evaluate retargeting`` writes for a robot.
 
-    Args:
-        scores: of all segments.
-
-    Returns:
-        What ``loco-drake evaluate retargeting`` writes for a robot: "labels", "all",
-        "frames_per_second", "failed", and "other" for labels that are not among the
-        fifteen, which "all" leaves out; "warnings" has sentences by clip, see
-        :mod:`loco_drake.retargeting.bounds`.
+    "labels", "all", "frames_per_second", "failed", and "other" for labels that are not
+    among the fifteen, which "all" leaves out; "warnings" has sentences by clip, see
+    :mod:`loco_drake.retargeting.bounds`.
     """
     names = [str(label) for label in LABELS]
     by_label: dict[str, list[ClipScore]] = {}
@@ -191,6 +165,7 @@ def summarize(scores: Sequence[ClipScore | FailedClip]) -> dict[str, Any]:
         clips = by_label.setdefault(score.segment.label, [])
         if isinstance(score, ClipScore):
             clips.append(score)
+    failed = [score for score in scores if isinstance(score, FailedClip)]
     done = [clip for clips in by_label.values() for clip in clips]
     known = [clip for clip in done if clip.segment.label in names]
     frames = sum(clip.report.frames for clip in done)
@@ -200,16 +175,12 @@ def summarize(scores: Sequence[ClipScore | FailedClip]) -> dict[str, Any]:
         "all": figures(known),
         "frames_per_second": frames / seconds if done else None,
         "warnings": {
-            clip.segment.name: clip.report.warnings
+            clip.segment.name: warnings
             for clip in done
-            if clip.report.warnings
+            if (warnings := clip.report.warnings)
         },
         "other": {k: figures(v) for k, v in by_label.items() if k not in names},
-        "failed": {
-            score.segment.name: score.error
-            for score in scores
-            if isinstance(score, FailedClip)
-        },
+        "failed": {clip.segment.name: clip.error for clip in failed},
     }
 
 
@@ -217,16 +188,16 @@ def figures(clips: Sequence[ClipScore]) -> dict[str, Any]:
     """Returns the figures of clips taken together; null ones come with a reason."""
     fidelities = [clip.fidelity for clip in clips if clip.fidelity is not None]
     reports = [clip.report for clip in clips]
-    slips = [clip.slip_speeds for clip in clips]
-    steps = np.concatenate(slips) if slips else np.empty(0)
+    steps = np.concatenate([np.empty(0), *(clip.slip_speeds for clip in clips)])
     frames = np.array([report.frames for report in reports])
+    worst_clips = _worst_clips(clips)
 
     def pooled(key: str) -> float | None:
         squares = np.array([getattr(report, key) ** 2 for report in reports])
         return float(np.sqrt(squares @ frames / frames.sum())) if reports else None
 
     def worst(key: str) -> float | None:
-        return max((getattr(report, key) for report in reports), default=None)
+        return worst_clips[key]["value"] if reports else None
 
     result: dict[str, Any] = {
         "stance_slip_median_mps": median(steps),
@@ -243,7 +214,7 @@ def figures(clips: Sequence[ClipScore]) -> dict[str, Any]:
     result["clips"] = len(clips)
     result["clips_outside_bounds"] = sum(bool(r.warnings) for r in reports)
     result["clips_of_three_strides"] = len(fidelities)
-    result["worst"] = _worst_clips(clips)
+    result["worst"] = worst_clips
     reasons = []
     if not clips:
         reasons.append("no clip could be retargeted")
@@ -256,10 +227,21 @@ def figures(clips: Sequence[ClipScore]) -> dict[str, Any]:
     return result
 
 
+# Figures of a report of which the worst clip is told beside the label's own.
+_WORST = (
+    "stance_slip_median_mps",
+    "penetration_max_m",
+    "joint_speed_ratio_max",
+    "toe_error_rmse_m",
+    "correction_rmse_m",
+    "trunk_correction_rmse_m",
+)
+
+
 def _worst_clips(clips: Sequence[ClipScore]) -> dict[str, dict[str, Any]]:
     """Returns the highest value of each figure, and the name of its clip."""
     worst = {}
-    for key in (*_WORST_OF_REPORT, *_FIDELITY):
+    for key in (*_WORST, *_FIDELITY):
         values = [
             (value, clip.segment.name)
             for clip in clips

@@ -69,18 +69,6 @@ class Column:
 
 
 @dataclass
-class Part:
-    """What a part of the pipeline is, in the paper's release and here.
-
-    Braces in ``ours`` stand for fields of the weights' configurations.
-    """
-
-    part: str = ""
-    paper: str = ""
-    ours: str = ""
-
-
-@dataclass
 class Result:
     """The command that writes a file of results, and a key of each robot's figures."""
 
@@ -116,7 +104,7 @@ class Content:
     sources: dict[str, str] = field(default_factory=dict)
     comparisons: dict[str, str] = field(default_factory=dict)
     clips: dict[str, float] = field(default_factory=dict)
-    parts: list[Part] = field(default_factory=list)
+    parts: dict[str, dict[str, str]] = field(default_factory=dict)
     results: list[Result] = field(default_factory=list)
     conditions: dict[str, Condition] = field(default_factory=dict)
     policies: list[Policy] = field(default_factory=list)

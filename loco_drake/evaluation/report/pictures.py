@@ -27,12 +27,7 @@ from loco_drake.motion.motion import Motion
 Array = NDArray[np.float64]
 
 # Readable on white and on near-black, and by the colour-blind.
-COLORS = {
-    "dog": "#d9730d",
-    "horse": "#2e86c9",
-    "mpc": "#1f9d6b",
-    "solo8": "#b5569b",
-}
+COLORS = dict(zip(SOURCES, ("#d9730d", "#2e86c9", "#1f9d6b", "#b5569b"), strict=True))
 ROBOT_COLORS = {"go2": "#2e86c9", "a1": "#d9730d"}
 
 # Stands for the colour of the page's text until the SVG is written.
@@ -91,8 +86,7 @@ def _as_svg(draw: Callable[_P, tuple[Figure, str]]) -> Callable[_P, str]:
 def gaits_picture(motions: Mapping[str, Sequence[Motion]]) -> tuple[Figure, str]:
     """Returns the outlines of robots in each gait, a row each (Figure 1).
 
-    Args:
-        motions: of each robot, one for each label, all of the same labels in order.
+    All robots have one motion for each of the same labels, in the same order.
     """
     robots = list(motions)
     count = len(motions[robots[0]])
@@ -109,20 +103,18 @@ def gaits_picture(motions: Mapping[str, Sequence[Motion]]) -> tuple[Figure, str]
                 style = {"ha": "right", "color": color, "weight": "bold"}
                 where = {"transform": cell.transAxes}
                 cell.text(-0.01, 0.4, str(motion.label), **where, **style)
-    alt = (
+    sources = ", ".join(dict.fromkeys(m.source for m in motions[robots[0]]))
+    return figure, (
         f"Outlines of {' and '.join(robots)} every tenth of a second in "
-        f"{count} generated gaits, from "
-        f"{', '.join(dict.fromkeys(m.source for m in motions[robots[0]]))}."
+        f"{count} generated gaits, from {sources}."
     )
-    return figure, alt
 
 
 @_as_svg
 def learning_picture(curves: Mapping[str, Figures]) -> tuple[Figure, str]:
     """Returns how returns grew in training, by source (Figure 3).
 
-    Args:
-        curves: of each robot, with "learning".
+    The figures of each robot are those with "learning".
     """
     figure = Figure(figsize=(5.5 * len(curves), 3.8), layout="constrained")
     axes = figure.subplots(1, len(curves), squeeze=False, sharey=True)[0]
@@ -143,11 +135,10 @@ def learning_picture(curves: Mapping[str, Figures]) -> tuple[Figure, str]:
         cell.grid(visible=True)
         cell.legend(loc="lower right", ncols=2)
     axes[0].set_ylabel("normalized return in training, of 100")
-    alt = (
+    return figure, (
         "Learning curves: mean normalized return of each source's gaits against "
         f"millions of steps; at the end {', '.join(ends)}."
     )
-    return figure, alt
 
 
 def _curves(figures: Figures) -> tuple[Array, dict[str, Array]]:
@@ -165,11 +156,7 @@ def _curves(figures: Figures) -> tuple[Array, dict[str, Array]]:
 
 @_as_svg
 def returns_picture(tracking: Mapping[str, Figures]) -> tuple[Figure, str]:
-    """Returns the return of each gait, robot beside robot.
-
-    Args:
-        tracking: figures of each robot.
-    """
+    """Returns the return of each gait, robot beside robot."""
     labels = [str(label) for label in LABELS]
     figure = Figure(figsize=(11, 3.9), layout="constrained")
     axes = figure.add_subplot()
@@ -205,12 +192,7 @@ def returns_picture(tracking: Mapping[str, Figures]) -> tuple[Figure, str]:
 
 @_as_svg
 def confusion_picture(figures: Figures, kind: str) -> tuple[Figure, str]:
-    """Returns what generated and recorded gaits were taken for, as three matrices.
-
-    Args:
-        figures: of generation.
-        kind: of classifier.
-    """
+    """Returns what gaits were taken for by a kind of classifier, as three matrices."""
     labels = figures.part("confusion").values.get("labels")
     known = [str(label) for label in LABELS]
     if not isinstance(labels, list) or labels != [k for k in known if k in labels]:
@@ -221,8 +203,7 @@ def confusion_picture(figures: Figures, kind: str) -> tuple[Figure, str]:
     }
     figure = Figure(figsize=(11, 4.7), layout="constrained")
     draw_confusions(figure, matrices, labels)
-    alt = (
+    return figure, (
         f"Confusion matrices of the {kind} classifier over {len(labels)} gaits: "
         "what each gait, a row, was taken for."
     )
-    return figure, alt

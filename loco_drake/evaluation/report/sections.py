@@ -182,18 +182,22 @@ def networks_table() -> Table:
     Raises:
         InputError: if shipped weights are damaged.
     """
-    network = asdict(load_tokenizer(pretrained_path("tokenizer")).config)
-    generator = asdict(load_generator(pretrained_path("generator")).config)
+    tokenizer = load_tokenizer(pretrained_path("tokenizer")).config
+    generator = load_generator(pretrained_path("generator")).config
     robot = get_robot(ROBOTS[0])
     policy = load_actor(policy_path(robot), robot).config
-    fields = {**network, **generator, "codebooks": network["codebooks"]}
-    fields["hidden"] = "-".join(str(width) for width in policy.hidden)
-    fields["observations"] = sum(size for _, size in policy.observation_layout)
-    fields["action_scale"] = policy.action_scale
-    fields["tokens_per_second"] = FPS / network["frames_per_token"]
-    fields["robots"] = " and ".join(map(robot_title, network["robots"]))
+    fields = {
+        **asdict(tokenizer),
+        **asdict(generator),
+        "codebooks": tokenizer.codebooks,
+        "hidden": "-".join(map(str, policy.hidden)),
+        "observations": sum(size for _, size in policy.observation_layout),
+        "action_scale": policy.action_scale,
+        "tokens_per_second": FPS / tokenizer.frames_per_token,
+        "robots": " and ".join(map(robot_title, tokenizer.robots)),
+    }
     rows = tuple(
-        Row(part.part, (Cell(part.paper), Cell(part.ours.format(**fields))))
-        for part in CONTENT.parts
+        Row(name, (Cell(part["paper"]), Cell(part["ours"].format(**fields))))
+        for name, part in CONTENT.parts.items()
     )
     return Table("The parts", "part", ("paper's release", "ours"), rows)
