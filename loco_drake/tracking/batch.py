@@ -28,12 +28,6 @@ class TrackingBatch:
         plans: the plans to track.
         config: configuration of each environment.
         count: B, the number of robots.
-
-    Attributes:
-        plan: index of the plan that each robot follows, shape (B,).
-        start: sample of its plan that each robot started at, shape (B,).
-        sample: sample of its plan that each robot is at, shape (B,).
-        penalty: penalties of each robot's last step for distance and falls, (B,).
     """
 
     def __init__(
@@ -59,10 +53,10 @@ class TrackingBatch:
         self._toes = np.concatenate([plan.p_BoF_H for plan in plans])
         self._contacts = np.concatenate([plan.contacts for plan in plans])
         self._labels = np.concatenate([plan.labels for plan in plans])
-        self.plan = np.zeros(count, dtype=np.int64)
-        self.start = np.zeros(count, dtype=np.int64)
-        self.sample = np.zeros(count, dtype=np.int64)
-        self.penalty = np.zeros(count)
+        self.plan = np.zeros(count, dtype=np.int64)  # index of each robot's plan
+        self.start = np.zeros(count, dtype=np.int64)  # sample that it started at
+        self.sample = np.zeros(count, dtype=np.int64)  # sample that it is at
+        self.penalty = np.zeros(count)  # of its last step, for distance and falls
         self._last = np.zeros(count, dtype=np.int64)
         self._state = np.zeros((count, 37))
         self._R_WB = np.zeros((count, 3, 3))
@@ -77,12 +71,8 @@ class TrackingBatch:
     ) -> None:
         """Starts an episode of robot ``i``.
 
-        Args:
-            i: which robot.
-            random: draws what is not given, and the noise.
-            plan: index of the plan to follow.
-            sample: where in it to start. By default anywhere that leaves half an
-                episode, where the plan is that long.
+        Draws the plan, unless its index is given, and the sample of it to start at:
+        anywhere that leaves half an episode, where the plan is that long.
         """
         if plan is None:
             plan = int(random.integers(len(self._plans)))
@@ -105,13 +95,9 @@ class TrackingBatch:
     def step(
         self, actions: NDArray[np.floating]
     ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
-        """Advances every robot by one control period.
+        """Advances every robot by one control period, given actions (B, 12).
 
-        Args:
-            actions: shape (B, 12).
-
-        Returns:
-            The reward's terms (B, 5), and who terminated and who is truncated, (B,).
+        Returns the reward's terms (B, 5), who terminated, and who is truncated, (B,).
         """
         self._action[:] = actions
         self.sample += 1
@@ -133,22 +119,13 @@ class TrackingBatch:
     def observe(
         self, robots: NDArray[np.int64] | slice = slice(None)
     ) -> NDArray[np.float32]:
-        """Returns observations, shape (robots, OBSERVATION_SIZE).
-
-        Args:
-            robots: of which; by default of all.
-        """
+        """Returns observations (B, OBSERVATION_SIZE), or those of some robots."""
         plan, sample = self.plan[robots], self.sample[robots]
         first, last = self._first[plan], self._lengths[plan] - 1
         ahead = np.minimum(sample[:, None] + LOOK_AHEAD, last[:, None])
         rows = first[:, None] + ahead
         q, v = split(self._wanted[rows])
-        shown = Preview(
-            q=q,
-            v=v,
-            contacts=self._contacts[rows],
-            label=self._labels[first + sample],
-        )
+        shown = Preview(q, v, self._contacts[rows], self._labels[first + sample])
         state, R_WB = self._measured(robots)
         observations = observe(self._robot, shown, state, self._action[robots], R_WB)
         return observations.astype(np.float32)

@@ -145,8 +145,8 @@ class PpoConfig:
                 f"--batch must be at least {2 * environments}, two steps of each of "
                 f"{environments} environments, not {self.batch}."
             )
-        for name in ("minibatch", "epochs"):
-            check_at_least(name, getattr(self, name), 1)
+        check_at_least("minibatch", self.minibatch, 1)
+        check_at_least("epochs", self.epochs, 1)
         if not self.hidden or min(self.hidden) < 1:
             raise InputError(f"--hidden must be widths above 0, not {self.hidden}.")
         for name in ("gamma", "gae_lambda", "clip", "actor_rate", "critic_rate"):
@@ -178,7 +178,7 @@ class TrainingConfig:
 
     def check(self) -> None:
         """Raises InputError unless a training can begin."""
-        for name in ("workers", "per_worker"):
-            check_at_least(name, getattr(self, name), 1)
+        check_at_least("workers", self.workers, 1)
+        check_at_least("per_worker", self.per_worker, 1)
         self.environment.check()
         self.ppo.check(self.workers * self.per_worker)

@@ -15,13 +15,10 @@ _PREFIX = "return/"
 
 
 def learning_curve(log: Path, points: int = POINTS) -> dict[str, Any]:
-    """Returns the thinned learning curve of a training log.
+    """Returns the learning curve of a training log ``progress.jsonl``, at most so long.
 
-    Resumed runs append to the same log; their seconds are summed.
-
-    Args:
-        log: ``progress.jsonl``, a line for each batch.
-        points: how many lines to keep at most; first and last are among them.
+    It has a line for each batch; the first and the last one are kept. Resumed runs
+    append to the same log; their seconds are summed.
 
     Returns:
         "steps" of the environment and "seconds" of training so far, and under "return"
@@ -46,7 +43,10 @@ def learning_curve(log: Path, points: int = POINTS) -> dict[str, Any]:
         "steps": [int(lines[i]["steps"]) for i in kept],
         "seconds": [round(seconds[i], 1) for i in kept],
         "return": {
-            label: [_rounded(lines[i].get(_PREFIX + label)) for i in kept]
+            label: [
+                None if score is None else round(score, 2)
+                for score in (lines[i].get(_PREFIX + label) for i in kept)
+            ]
             for label in labels
         },
     }
@@ -68,7 +68,3 @@ def _sound_lines(log: Path) -> Iterator[tuple[str, dict[str, float]]]:
             row = {name: float(value) for name, value in parse_json(text).items()}
             if row.keys() >= {"steps", "seconds"}:
                 yield text, row
-
-
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else round(value, 2)

@@ -1,8 +1,9 @@
 """Simulation of control periods, in one world for all robots or one for each."""
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,18 +23,13 @@ Array = NDArray[np.float64]
 
 @lru_cache(maxsize=4)
 def _diagram(
-    robot: str,
-    contact: str,
-    time_step: float,
-    friction: float,
-    disturbances: Disturbances,
+    robot: str, plant: tuple[tuple[str, Any], ...], disturbances: Disturbances
 ) -> Diagram:
     # One per process: pydrake never frees diagrams with Python systems.
-    plant = PlantConfig(contact=contact, time_step=time_step, friction=friction)
     return MakeLocomotionDiagram(
         Scenario(
             robot=robot,
-            plant=plant,
+            plant=PlantConfig(**dict(plant)),
             policy=ExternalTargets(),
             disturbances=disturbances,
         )
@@ -44,13 +40,11 @@ class _Simulation:
     """The plant in a Context, with its state and the port of its targets at hand."""
 
     def __init__(self, config: EnvironmentConfig, disturbances: Disturbances) -> None:
-        plant = config.plant
-        diagram = _diagram(
-            config.robot, plant.contact, plant.time_step, plant.friction, disturbances
-        )
+        plant = tuple(asdict(config.plant).items())
+        diagram = _diagram(config.robot, plant, disturbances)
         self._diagram = diagram
         self._simulator = Simulator(diagram, diagram.CreateDefaultContext())
-        ConfigureSimulator(self._simulator, plant)
+        ConfigureSimulator(self._simulator, config.plant)
         self._context = self._simulator.get_mutable_context()
         self._plant = diagram.GetSubsystemByName("plant")
         self._plant_context = self._plant.GetMyMutableContextFromRoot(self._context)
@@ -60,9 +54,8 @@ class _Simulation:
     def _set(self, state: Array, desired_state: Array) -> None:
         self._plant.SetPositionsAndVelocities(self._plant_context, state)
         # GetMutableData tells what depends on it that it changes.
-        self._desired_state.GetMutableData().get_mutable_value().set_value(
-            desired_state
-        )
+        targets = self._desired_state.GetMutableData().get_mutable_value()
+        targets.set_value(desired_state)
 
     def _advance(self, time: float) -> Array:
         self._simulator.AdvanceTo(time, interruptible=False)
@@ -93,9 +86,7 @@ class SharedWorld(_Simulation):
     def advance(self, state: Array, desired_state: Array) -> Array:
         """Returns the state [q, v], (37,), one control period after ``state``.
 
-        Args:
-            state: as what is returned.
-            desired_state: of the PD, [q_d, v_d], shape (24,).
+        The PD's desired state is [q_d, v_d], shape (24,).
         """
         self._set(state, desired_state)
         if not self._runs_on:

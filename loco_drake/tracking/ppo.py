@@ -27,24 +27,14 @@ class SymmetricPolicy(ActorCriticPolicy):
     """Actor and critic averaged over the observation and its mirror image.
 
     The mean action mirrors with the observation and the value is invariant, exactly.
-    Observations must be normalized by :class:`SymmetricStatistics`.
-
-    Args:
-        *args: as of ActorCriticPolicy.
-        privileged: whether the actor sees all of the observation; the critic, which is
-            needed in training only, always does (Pinto et al. 2018, "Asymmetric actor
-            critic").
-        **kwargs: as of ActorCriticPolicy.
+    Observations must be normalized by :class:`SymmetricStatistics`. An actor that is
+    not ``privileged`` sees part of the observation; the critic, which is needed in
+    training only, sees all of it (Pinto et al. 2018, "Asymmetric actor critic").
     """
 
     _mask: Tensor
 
-    def __init__(
-        self,
-        *args: Any,
-        privileged: bool = True,
-        **kwargs: Any,
-    ) -> None:
+    def __init__(self, *args: Any, privileged: bool = True, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._privileged = privileged
         self.register_buffer("_mask", unprivileged_mask(), persistent=False)
@@ -101,13 +91,10 @@ class AdaptivePPO(PPO):
 
     def split_optimizer(self, critic_rate: float) -> None:
         """Creates separate parameter groups for actor and critic."""
-        actor: list[torch.nn.Parameter] = []
-        critic: list[torch.nn.Parameter] = []
-        for name, parameter in self.policy.named_parameters():
-            (critic if "value" in name else actor).append(parameter)
+        named = list(self.policy.named_parameters())
         groups: list[dict[str, Any]] = [
-            {"params": actor},
-            {"params": critic, "lr": critic_rate},
+            {"params": [p for name, p in named if "value" not in name]},
+            {"params": [p for name, p in named if "value" in name], "lr": critic_rate},
         ]
         self.policy.optimizer = torch.optim.Adam(groups, lr=self.rate, eps=1e-5)
 
@@ -133,13 +120,7 @@ class AdaptivePPO(PPO):
 
 
 def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
-    """Returns a learner on ``environment`` with normalized observations.
-
-    Args:
-        environment: what to learn in.
-        config: how to learn.
-        seed: of everything random.
-    """
+    """Returns a learner on ``environment`` with normalized observations."""
     normalized = VecNormalize(
         environment,
         norm_reward=False,
@@ -179,10 +160,8 @@ def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
 def export_actor(learner: AdaptivePPO, config: ActorConfig) -> Actor:
     """Returns the learner's policy as the network that the diagram uses."""
     actor = Actor(config)
-    trained = [
-        *learner.policy.mlp_extractor.policy_net,
-        learner.policy.action_net,
-    ]
+    policy = learner.policy
+    trained = [*policy.mlp_extractor.policy_net, policy.action_net]
     with torch.no_grad():
         for ours, theirs in zip(actor.layers, trained, strict=True):
             ours.load_state_dict(theirs.state_dict())

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, fields, replace
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,9 +75,7 @@ class RandomizationConfig:
     ) -> None:
         """Raises InputError unless every range can be drawn from.
 
-        Args:
-            robot: whose motors must be able to be that weak; None does not ask.
-            plant: in which; by default the usual one.
+        The motors of ``robot``, if given, must be able to be as weak in ``plant``.
         """
         from loco_drake.models.parameters import check_strength
         from loco_drake.models.plant import PlantConfig
@@ -123,12 +121,8 @@ class RandomizationConfig:
     @property
     def changes_physics(self) -> bool:
         """Whether worlds differ from the model in more than what is measured."""
-        others = {"noise", "push_interval"}
-        return any(
-            getattr(self, part.name) is not None
-            for part in fields(self)
-            if part.name not in others
-        )
+        others = replace(self, noise=None, push_interval=STANDARD.push_interval)
+        return others != RandomizationConfig()
 
     @property
     def is_off(self) -> bool:
@@ -147,25 +141,19 @@ class RandomizationConfig:
             end: and ends.
         """
 
-        def uniform(bounds: tuple[float, float] | None) -> float | None:
-            return None if bounds is None else float(random.uniform(*bounds))
+        def uniform(bounds: Any, size: int | None = None) -> Any:
+            return (
+                None if bounds is None else random.uniform(bounds[0], bounds[1], size)
+            )
 
+        log_stiffness = self.stiffness and np.log(self.stiffness)
+        friction, stiffness = uniform(self.friction), uniform(log_stiffness)
         return Domain(
-            friction=uniform(self.friction),
-            stiffness=(
-                None
-                if self.stiffness is None
-                else float(np.exp(random.uniform(*np.log(self.stiffness))))
-            ),
+            friction=friction,
+            stiffness=None if stiffness is None else float(np.exp(stiffness)),
             payload=uniform(self.payload),
-            com_shift=(
-                None if self.com_shift is None else random.uniform(*self.com_shift, 3)
-            ),
-            strength=(
-                None
-                if self.motor_strength is None
-                else random.uniform(*self.motor_strength, 12)
-            ),
+            com_shift=uniform(self.com_shift, 3),
+            strength=uniform(self.motor_strength, 12),
             latency=uniform(self.latency) or 0.0,
             pushes=self._draw_pushes(robot, random, start, end),
             sensors=self._draw_errors(random),

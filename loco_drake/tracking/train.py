@@ -150,7 +150,7 @@ def train_tracker(
             environment.close()
     return {
         "robot": config.environment.robot,
-        "steps": saver.saved_steps or steps_before,
+        "steps": saver.saved_steps,
         "wall_clock_s": time.monotonic() - start,
         "interrupted": interrupted,
         "scores": sampler.score_by_label(),
@@ -170,25 +170,23 @@ def _beginning(path: Path, hidden: list[int]) -> Checkpoint:
     return saved
 
 
-def _tensors(learner: AdaptivePPO, sampler: PlanSampler) -> dict[str, Tensor]:
-    tensors = learning_tensors(learner.policy, learner.policy.optimizer)
+def _state(
+    learner: AdaptivePPO, sampler: PlanSampler
+) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """Returns what :func:`_restore` needs, as :meth:`.RunFolder.save` takes it."""
     statistics = learner.statistics
+    # stable-baselines3 shuffles its minibatches with numpy's global generator.
+    _, keys, position, has_gauss, gauss = np.random.get_state()  # noqa: NPY002
+    tensors = learning_tensors(learner.policy, learner.policy.optimizer)
     tensors["normalizer/mean"] = torch.from_numpy(statistics.mean)
     tensors["normalizer/variance"] = torch.from_numpy(statistics.var)
+    tensors["random/numpy"] = torch.from_numpy(np.asarray(keys).astype(np.int64))
     for name in _SCORES:
         tensors[f"sampler/{name}"] = torch.from_numpy(getattr(sampler, name))
-    # stable-baselines3 shuffles its minibatches with numpy's global generator.
-    _, keys, *_ = np.random.get_state()  # noqa: NPY002
-    tensors["random/numpy"] = torch.from_numpy(np.asarray(keys).astype(np.int64))
-    return tensors
-
-
-def _state(learner: AdaptivePPO, sampler: PlanSampler) -> dict[str, Any]:
-    _, _, position, has_gauss, gauss = np.random.get_state()  # noqa: NPY002
-    return {
+    return tensors, {
         "steps": learner.num_timesteps,
         "learning_rate": learner.rate,
-        "normalizer_count": float(learner.statistics.count),
+        "normalizer_count": float(statistics.count),
         "sampler_random": sampler.random.bit_generator.state,
         "numpy_random": [int(position), int(has_gauss), float(gauss)],
     }
@@ -236,39 +234,33 @@ class _Saver(BaseCallback):
         stop_requested: Event,
     ) -> None:
         super().__init__()
-        self.saved_steps = 0
+        self.saved_steps = run.saved.state["steps"] if run.saved else 0
         self._run = run
         self._log = log
         self._sampler = sampler
         self._config = config
         self._report = report
         self._stop_requested = stop_requested
-        self._first = True
         self._start = time.monotonic()
 
     def _on_step(self) -> bool:
         return not self._stop_requested.is_set()
 
     def _on_rollout_start(self) -> None:
-        # The update for the last batch has just been done.
-        if self._first:
-            self._first = False
+        if self.num_timesteps == self.saved_steps:
             return
+        # The update for the last batch has just been done.
         assert isinstance(self.model, AdaptivePPO)
         scores = self._sampler.score_by_label()
         for label, score in scores.items():
             self.logger.record(f"return/{label}", score)
-        with torch.no_grad():
-            deviation = float(self.model.policy.log_std.exp().mean())
-        self.logger.record("train/std", deviation)
         episodes = self.model.ep_info_buffer
         if episodes:
             lengths = [episode["l"] for episode in episodes]
             self.logger.record("return/episode_steps", float(np.mean(lengths)))
         line = {"steps": self.num_timesteps, "seconds": time.monotonic() - self._start}
         for name, value in self.logger.name_to_value.items():
-            if isinstance(value, int | float | np.floating):
-                line[name] = float(value)
+            line[name] = float(value)
         self.logger.dump(self.num_timesteps)
         with self._log.open("a") as log:
             log.write(json.dumps(line) + "\n")
@@ -277,7 +269,7 @@ class _Saver(BaseCallback):
 
     def save(self, learner: AdaptivePPO) -> None:
         """Writes the checkpoint and the policy."""
-        self._run.save(_tensors(learner, self._sampler), _state(learner, self._sampler))
+        self._run.save(*_state(learner, self._sampler))
         self.saved_steps = learner.num_timesteps
         actor = ActorConfig(
             robot=self._config.environment.robot,

@@ -4,6 +4,7 @@ import contextlib
 import gc
 import multiprocessing
 import signal
+from itertools import chain
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -58,16 +59,10 @@ def _step(
     actions: NDArray[np.float32],
     next_plans: list[int],
     random: list[np.random.Generator],
-) -> tuple[
-    NDArray[np.float32],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.bool_],
-    list[Any],
-]:
+) -> tuple[Any, ...]:
     """Steps all robots and resets those whose episodes ended, as VecEnv requires.
 
-    Returns the reward without penalties and the penalties separately.
+    Returns observations, rewards without penalties, penalties, dones and infos.
     """
     terms, terminated, truncated = batch.step(actions)
     observations = batch.observe()
@@ -94,14 +89,8 @@ def _step(
 class WorkerVecEnv(VecEnv):
     """``workers * per_worker`` environments for stable-baselines3.
 
-    Args:
-        plans: what to follow.
-        config: of each environment.
-        sampler: draws the plan of each episode and is told how it went.
-        workers: processes.
-        per_worker: environments in each; many amortise pipes and inference.
-        reward_scale: factor of the rewards.
-        seed: of the environments' own randomness.
+    Many environments per worker process amortise pipes and inference. The sampler draws
+    the plan of each episode and is told how it went; ``seed`` is of all else.
 
     Raises:
         ChildProcessError: from stepping, if a worker process was killed.
@@ -164,42 +153,30 @@ class WorkerVecEnv(VecEnv):
         self,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[Any]]:
         """Returns observations, rewards, dones and infos."""
-        parts = zip(*self._receive(), strict=True)
-        observations, returns, penalties, dones = (
-            np.concatenate(next(parts)) for _ in range(4)
-        )
-        infos = [info for part in next(parts) for info in part]
+        *arrays, of_workers = zip(*self._receive(), strict=True)
+        observations, returns, penalties, dones = map(np.concatenate, arrays)
+        infos = list(chain.from_iterable(of_workers))
         self._returns += returns
         self._lengths += 1
         for i in np.flatnonzero(dones):
-            info = infos[i]
+            info, total, length = infos[i], self._returns[i], int(self._lengths[i])
             # Steps lost to a fall count as 0; those cut off by the plan's end do not.
-            steps = (
-                self._lengths[i] if info["TimeLimit.truncated"] else self._episode_steps
-            )
+            steps = length if info["TimeLimit.truncated"] else self._episode_steps
             if not self._retrying[i]:
-                self._sampler.record(
-                    info["plan"],
-                    self._returns[i] / steps,
-                    self._lengths[i] / self._episode_steps,
-                )
-            info["episode"] = {
-                "r": 100 * self._returns[i] / steps,
-                "l": int(self._lengths[i]),
-                "t": 0.0,
-            }
+                share = length / self._episode_steps
+                self._sampler.record(info["plan"], total / steps, share)
+            info["episode"] = {"r": 100 * total / steps, "l": length, "t": 0.0}
             self._retrying[i] = info["retried"]
             if not info["retried"]:
                 self._next_plans[i] = self._sampler.draw()
-            self._returns[i] = 0
-            self._lengths[i] = 0
+        self._returns[dones] = self._lengths[dones] = 0
         rewards = (returns - penalties).astype(np.float32) * self._reward_scale
         return observations, rewards, dones, infos
 
     def close(self) -> None:
         """Ends the workers."""
         for pipe in self._pipes:
-            with contextlib.suppress(BrokenPipeError, OSError):
+            with contextlib.suppress(OSError):  # a broken pipe
                 pipe.send(None)
             pipe.close()
         for process in self._processes:
@@ -211,21 +188,17 @@ class WorkerVecEnv(VecEnv):
     def _send(self, actions: NDArray[np.float32] | None) -> None:
         for w, pipe in enumerate(self._pipes):
             own = slice(w * self._per_worker, (w + 1) * self._per_worker)
+            theirs = None if actions is None else actions[own]
             try:
-                pipe.send(
-                    (None if actions is None else actions[own], self._next_plans[own])
-                )
-            except (BrokenPipeError, OSError):
+                pipe.send((theirs, self._next_plans[own]))
+            except OSError:  # a broken pipe
                 raise ChildProcessError(_DIED) from None
 
     def _receive(self) -> list[Any]:
-        results: list[Any] = []
-        for pipe in self._pipes:
-            try:
-                results.append(pipe.recv())
-            except (EOFError, ConnectionResetError):
-                raise ChildProcessError(_DIED) from None
-        return results
+        try:
+            return [pipe.recv() for pipe in self._pipes]
+        except (EOFError, ConnectionResetError):
+            raise ChildProcessError(_DIED) from None
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """Returns an attribute of this object, once for each environment."""
