@@ -50,10 +50,8 @@ class UrdfLegs(NamedTuple):
 def find_urdf(url: str, folder: Path) -> Path:
     """Returns the path of a URDF, which exists.
 
-    Args:
-        url: a path relative to ``folder``, or package://NAME/..., where NAME is
-            example-robot-data or lies below a folder of ROS_PACKAGE_PATH.
-        folder: where a relative path begins.
+    ``url`` is a path relative to ``folder``, or package://NAME/..., where NAME is
+    example-robot-data or lies below a folder of ROS_PACKAGE_PATH.
 
     Raises:
         InputError: if there is no such package or file.
@@ -79,14 +77,10 @@ def read_legs(
     feet: Sequence[str],
     stand: Array,
 ) -> UrdfLegs:
-    """Returns the legs in a URDF.
+    """Returns the legs in a URDF, by names of the frame B, joints and toes' frames.
 
-    Args:
-        path: the file.
-        trunk: name of the frame B.
-        joints: of each leg, from the trunk to the toe; all others stay at zero.
-        feet: names of the frames at the toes.
-        stand: joints of the usual stance, rad, shape (4 n,).
+    Those of ``joints``, of each leg from the trunk to the toe, are at ``stand`` in the
+    usual stance, rad, shape (4 n,); all others stay at zero.
 
     Raises:
         InputError: naming what is missing or impossible.
@@ -98,7 +92,7 @@ def read_legs(
         _read_limits(elements[check_choice("joint", name, elements)]) for name in names
     ]
     lower, upper, speed = np.array(limits).T
-    _check_independent(root, feet)
+    above = [_joints_above(root, foot) for foot in feet]
     model = _strip(root, names)
     plant = MultibodyPlant(time_step=0.0)
     try:
@@ -115,8 +109,14 @@ def read_legs(
     check_choice("trunk", trunk, frames)
     for foot in feet:
         check_choice("foot", foot, frames)
-    for leg, foot, own in zip(LEGS, feet, joints, strict=True):
-        _check_path(plant, leg, foot, own, names)
+    for leg, foot, own, found in zip(LEGS, feet, joints, above, strict=True):
+        moved_by = [name for name in found if name in names]
+        if moved_by != list(own):
+            raise InputError(
+                f"Foot {foot} of leg {leg} is moved by the joints "
+                f"{', '.join(moved_by) or '(none)'}, in this order, "
+                f"not by {', '.join(own)}."
+            )
     context = plant.CreateDefaultContext()
     base = plant.GetFrameByName(trunk)
     for joint in moving:
@@ -194,22 +194,24 @@ def _read_limits(joint: ET.Element) -> tuple[float, float, float]:
     return lower, upper, speed
 
 
-def _check_independent(root: ET.Element, feet: Sequence[str]) -> None:
-    """Raises InputError if a joint on the way to a foot follows another joint."""
+def _joints_above(root: ET.Element, foot: str) -> list[str]:
+    """Returns the names of the joints from the root of the tree to a foot.
+
+    Raises InputError if one of them follows another joint.
+    """
     link_of = {f.get("name"): f.get("link") for f in root.iterfind("frame")}
     above = {_end(joint, "child"): joint for joint in root.iterfind("joint")}
-    for foot in feet:
-        link, seen = link_of.get(foot, foot), set()
-        while link in above and link not in seen:
-            seen.add(link)
-            joint = above[link]
-            mimic = joint.find("mimic")
-            if mimic is not None:
-                raise InputError(
-                    f"Joint {joint.get('name')}, on the way to foot {foot}, mimics "
-                    f"{mimic.get('joint')}; a leg's joints must move on their own."
-                )
-            link = _end(joint, "parent")
+    link, found = link_of.get(foot, foot), []
+    while link in above and above[link] not in found:
+        joint = above[link]
+        found.append(joint)
+        if (mimic := joint.find("mimic")) is not None:
+            raise InputError(
+                f"Joint {joint.get('name')}, on the way to foot {foot}, mimics "
+                f"{mimic.get('joint')}; a leg's joints must move on their own."
+            )
+        link = _end(joint, "parent")
+    return [str(joint.get("name")) for joint in reversed(found)]
 
 
 def _end(joint: ET.Element, tag: str) -> str | None:
@@ -231,31 +233,6 @@ def _strip(root: ET.Element, joints: Sequence[str]) -> str:
         if joint.get("name") not in joints:
             joint.set("type", "fixed")
     return ET.tostring(root, encoding="unicode")
-
-
-def _check_path(
-    plant: MultibodyPlant,
-    leg: str,
-    foot: str,
-    joints: Sequence[str],
-    all_joints: Sequence[str],
-) -> None:
-    """Raises InputError unless the joints of a leg, and no others, move its foot."""
-    body = plant.GetFrameByName(foot).body().index()
-
-    def moved(joint: str) -> list[object]:
-        index = plant.GetJointByName(joint).index()
-        return plant.GetBodiesKinematicallyAffectedBy([index])
-
-    moving = [joint for joint in all_joints if body in moved(joint)]
-    # A joint moves fewer bodies the further it is from the trunk.
-    moving.sort(key=lambda joint: -len(moved(joint)))
-    if moving != list(joints):
-        raise InputError(
-            f"Foot {foot} of leg {leg} is moved by the joints "
-            f"{', '.join(moving) or '(none)'}, in this order, "
-            f"not by {', '.join(joints)}."
-        )
 
 
 def _check_end(plant: MultibodyPlant, context: Context, foot: str, hip: str) -> None:

@@ -9,6 +9,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 import numpy as np
+from pydrake.common.yaml import yaml_load
 
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, check_choice, one_line
@@ -73,41 +74,14 @@ def register_dataset(dataset: Dataset) -> None:
     DATASETS[dataset.source] = dataset
 
 
-for _dataset in (
-    Dataset(
-        source="dog",
-        folder="dog_mann",
-        licence="CC BY-NC 4.0",
-        attribution="Zhang, Starke, Komura, Saito 2018 (MANN, AI4Animation)",
-        read=dog.read_dog,
-        body=dog.BODY,
-    ),
-    Dataset(
-        source="horse",
-        folder="horse_vhdc",
-        licence="CC BY-SA 4.0 (3.0 by another catalogue)",
-        attribution="Vienna Horse Data Collection (VHDC), Vetmeduni Vienna / Bonn",
-        read=horse.read_horse,
-        body=horse.BODY,
-    ),
-    Dataset(
-        source="mpc",
-        folder="mpc_rfmpc",
-        licence="none stated (made with RF-MPC, MIT)",
-        attribution="LearnDiverseLoco's authors 2025, with RF-MPC by Yanran Ding",
-        read=mpc.read_mpc,
-        body=mpc.BODY,
-    ),
-    Dataset(
-        source="solo8",
-        folder="solo8_cassi",
-        licence="BSD-3-Clause",
-        attribution="Li et al. 2023 (CASSI), as points by LearnDiverseLoco",
-        read=solo8.read_solo8,
-        body=solo8.BODY,
-    ),
+_ORIGINS = yaml_load(filename=str(Path(__file__).with_name("origins.yaml")))
+for _source, _read, _body in (
+    ("dog", dog.read_dog, dog.BODY),
+    ("horse", horse.read_horse, horse.BODY),
+    ("mpc", mpc.read_mpc, mpc.BODY),
+    ("solo8", solo8.read_solo8, solo8.BODY),
 ):
-    register_dataset(_dataset)
+    register_dataset(Dataset(_source, read=_read, body=_body, **_ORIGINS[_source]))
 
 for _entry in entry_points(group=ENTRY_POINTS):
     try:
@@ -141,13 +115,9 @@ def read_clip(
     Conventions are measured over the whole recording. Corrections are stored in the
     provenance and logged as warnings.
 
-    Args:
-        source: source of the file, a key of :data:`DATASETS`.
-        path: the file.
-        gait: the gait in this stretch.
-        start: first frame, from 0; None for the first usable one.
-        end: end frame, exclusive; None for the end of the file.
-        fps: frames per second; None to infer it.
+    The stretch begins with frame ``start``, from 0 and by default the first usable one,
+    and ends before ``end``, by default that of the file. ``fps`` is inferred if it is
+    None.
 
     Raises:
         InputError: if the source is unknown, the file is not of its format, the stretch
