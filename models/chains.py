@@ -78,10 +78,6 @@ class ChainRobot(Quadruped):
         origins: Array = self._forward(_legs(joints))[2][..., -1, :]
         return origins
 
-    def reachable_toes(self, p_BF: Array) -> Array:
-        """Returns the places that are nearest to ``p_BF``."""
-        return self.toe_positions(self.nearest_joints(p_BF))
-
     def nearest_joints(self, p_BF: Array) -> Array:
         """Returns joints that put the toes as near as can be, knees as in the stance.
 
@@ -116,11 +112,8 @@ class ChainRobot(Quadruped):
             toes = np.where(better[..., None], new[0], toes)
             axes = np.where(better[..., None, None], new[1], axes)
             origins = np.where(better[..., None, None], new[2], origins)
-            damping = np.clip(
-                np.where(better, _SOFTER, _HARDER) * damping,
-                _LEAST_DAMPING,
-                _MOST_DAMPING,
-            )
+            damping = damping * np.where(better, _SOFTER, _HARDER)
+            damping = damping.clip(_LEAST_DAMPING, _MOST_DAMPING)
             if ((moved < _FINE_STEP) | (damping >= _MOST_DAMPING)).all():
                 break
         return joints.reshape(*joints.shape[:-2], len(self.joint_names))

@@ -70,6 +70,6 @@ class Quadruped(ABC):
     def nearest_joints(self, p_BF: Array) -> Array:
         """Returns joints (..., J) within the limits that put the toes near ``p_BF``."""
 
-    @abstractmethod
     def reachable_toes(self, p_BF: Array) -> Array:
         """Returns toe positions within the limits near ``p_BF``, shape (..., 4, 3)."""
+        return self.toe_positions(self.nearest_joints(p_BF))

@@ -138,7 +138,7 @@ class Robot(Quadruped):
         lowered[..., 2] = np.minimum(p_BF[..., 2], self.p_BHip[:, 2] - drop)
         folds = x**2 + y**2 + z**2 < square
         goal = np.where(folds[..., None], lowered, p_BF)
-        return self.toe_positions(self.nearest_joints(goal))
+        return super().reachable_toes(goal)
 
     def _ends(self, joints: Array, calf_length: float) -> Array:
         """Returns points (..., 4, 3) in B at this distance below the calf joints."""

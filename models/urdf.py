@@ -119,8 +119,6 @@ def read_legs(
             )
     context = plant.CreateDefaultContext()
     base = plant.GetFrameByName(trunk)
-    for joint in moving:
-        joint.set_angle(context, 0.0)
     poses = [joint.frame_on_child().CalcPose(context, base) for joint in moving]
     axes = [
         X_BJ.rotation() @ joint.revolute_axis()

@@ -74,7 +74,7 @@ def clip_track(clip: KeypointClip, stance_height: float) -> Track:
     spine = clip.withers - clip.hip
     return Track(
         fps=clip.fps,
-        trunk=((clip.withers + clip.hip) / 2)[:, :2],
+        trunk=clip.middle[:, :2],
         yaw=np.arctan2(spine[:, 1], spine[:, 0]),
         soles=clip.toes,
         stance_height=stance_height,

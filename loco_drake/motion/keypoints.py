@@ -47,6 +47,11 @@ class KeypointClip:
     def __len__(self) -> int:
         return len(self.withers)
 
+    @property
+    def middle(self) -> Array:
+        """Midway between withers and hip, shape (T, 3)."""
+        return (self.withers + self.hip) / 2
+
     def mirrored(self) -> "KeypointClip":
         """Returns the clip reflected in the plane y = 0 (left for right)."""
         return replace(

@@ -13,7 +13,6 @@ from loco_drake.retargeting.scaling import ContactConfig, RetargetConfig
 # Cut-off of the trunk's speed, to which a toe's speed is compared, Hz.
 _TRUNK_SPEED_HZ = 1.0
 
-
 # An animal is on its feet where the heights of withers and hip, over the distances of
 # their toes, are above UPRIGHT, the legs are longer than UNFOLDED of the longest they
 # are, and the trunk's height is above OFF_THE_GROUND of its length. In the stretches of
@@ -37,12 +36,11 @@ def on_feet(clip: KeypointClip) -> Bools:
     """
     front = np.linalg.norm(clip.toes[:, :2] - clip.withers[:, None], axis=-1).mean(1)
     rear = np.linalg.norm(clip.toes[:, 2:] - clip.hip[:, None], axis=-1).mean(1)
-    height = (clip.withers[:, 2] + clip.hip[:, 2]) / 2
     trunk = np.median(np.linalg.norm(clip.withers - clip.hip, axis=-1))
     upright = (
         (clip.withers[:, 2] > UPRIGHT * front)
         & (clip.hip[:, 2] > UPRIGHT * rear)
-        & (height > OFF_THE_GROUND * trunk)
+        & (clip.middle[:, 2] > OFF_THE_GROUND * trunk)
         & (np.abs(clip.withers[:, 2] - clip.hip[:, 2]) < STEEP * trunk)
     )
     legs = front + rear
@@ -78,7 +76,7 @@ def stance_height(clip: KeypointClip, config: RetargetConfig) -> float:
         InputError: if the middle lies below the ground, or the animal is on its feet in
             too few frames to tell its size, naming these.
     """
-    middle = (clip.withers[:, 2] + clip.hip[:, 2]) / 2
+    middle = clip.middle[:, 2]
     lowest = float(np.percentile(middle, config.stance_height_percentile))
     if lowest <= 0:
         raise InputError(
@@ -109,8 +107,7 @@ def detect_contacts(clip: KeypointClip, height: float, config: ContactConfig) ->
     """
     toe_height = clip.toes[..., 2] / height
     toe_speed = np.linalg.norm(np.gradient(clip.toes, 1 / clip.fps, axis=0), axis=-1)
-    middle = (clip.withers + clip.hip)[:, :2] / 2
-    velocity = np.gradient(middle, 1 / clip.fps, axis=0)
+    velocity = np.gradient(clip.middle[:, :2], 1 / clip.fps, axis=0)
     trunk = smooth(velocity, _TRUNK_SPEED_HZ, clip.fps)
     trunk_speed = np.linalg.norm(trunk, axis=-1)[:, None]
     land_speed = np.maximum(config.land_speed, config.land_speed_ratio * trunk_speed)

@@ -56,8 +56,7 @@ def summarize(clip: KeypointClip) -> tuple[ClipSummary, Bools]:
 
 def trunk_speed(clip: KeypointClip) -> Array:
     """Returns the horizontal speed in m/s of the trunk's middle, shape (T,)."""
-    middle = (clip.withers + clip.hip)[:, :2] / 2
-    velocity = np.gradient(middle, 1 / clip.fps, axis=0)
+    velocity = np.gradient(clip.middle[:, :2], 1 / clip.fps, axis=0)
     speed: Array = np.hypot(velocity[:, 0], velocity[:, 1])
     return speed
 

@@ -31,12 +31,9 @@ class LegSolver:
     The trunk is fixed, so targets are positions in the trunk frame B. The program is
     built once; only bounds and costs change. Its solution has the toes within
     ``TOLERANCE`` of the targets and the joints within the limits of position and speed.
-
-    Attributes:
-        options: of the solver.
     """
 
-    def __init__(self, robot: Quadruped, fps: float):
+    def __init__(self, robot: Quadruped, fps: float) -> None:
         self._robot = robot
         # A margin, since the solver may slightly exceed its bounds.
         self._step = 0.999 * robot.joint_speed_limits / fps
@@ -47,10 +44,8 @@ class LegSolver:
         self._plant.Finalize()
         self._feet = [self._plant.GetFrameByName(foot) for foot in robot.foot_frames]
         # The model may have the legs in another order.
-        self._order = [
-            self._plant.GetJointByName(joint).position_start()
-            for joint in robot.joint_names
-        ]
+        joints = [self._plant.GetJointByName(joint) for joint in robot.joint_names]
+        self._order = [joint.position_start() for joint in joints]
         self._solver = SnoptSolver()
         self.options = SolverOptions()
         self.options.SetOption(self._solver.id(), "Major feasibility tolerance", 1e-7)
@@ -99,12 +94,12 @@ class LegSolver:
     def _best(
         self, p_BF: Array, ended: Array, previous: Array, lower: Array, upper: Array
     ) -> Array:
+        def error(joints: Array) -> float:
+            return float(np.linalg.norm(self._robot.toe_positions(joints) - p_BF))
+
         guess = self._robot.nearest_joints(p_BF).clip(lower, upper)
         choices = [q for q in (ended, guess, previous) if np.isfinite(q).all()]
-        errors = [
-            float(np.linalg.norm(self._robot.toe_positions(q) - p_BF)) for q in choices
-        ]
-        return choices[int(np.argmin(errors))]
+        return min(choices, key=error)
 
     def _solve_exactly(
         self, p_BF: Array, previous: Array, lower: Array, upper: Array

@@ -136,9 +136,7 @@ def retarget_clip(
         mirrored=variant.mirror,
         on_feet_share=None if standing is None else float(standing.mean()),
         on_feet_frames=None if standing is None else frames_on_feet(clip, standing),
-        trunk_height_ratio=float(
-            np.median((clip.withers + clip.hip)[:, 2]) / 2 / height
-        ),
+        trunk_height_ratio=float(np.median(clip.middle[:, 2]) / height),
         toes_in_place_share=quality.toes_in_place_share(joints, robot),
         source_track_m=track_width(clip),
         unsolved_frames=int((~solved).sum()),

@@ -196,7 +196,7 @@ def scale_to_robot(
     trunk = clip.withers - clip.hip
     yaw = np.unwrap(np.arctan2(trunk[:, 1], trunk[:, 0]))
     pitch = -np.arctan2(trunk[:, 2], np.hypot(trunk[:, 0], trunk[:, 1]))
-    p_WB = alpha * (clip.withers + clip.hip) / 2
+    p_WB = alpha * clip.middle
     p_WB[:, 2] += config.base_height_offset
     base = Targets(p_WB=p_WB, yaw=yaw, pitch=pitch, p_WF=np.empty((0, 4, 3)))
 
