@@ -34,11 +34,8 @@ class PlanPlayer(LeafSystem):
         - plan: abstract, Plan
 
     The plan is an abstract parameter: constant during a simulation, and set for each
-    episode with :meth:`SetPlan`.
-
-    Args:
-        robot: the robot.
-        plan: the plan in a default Context; by default the robot stands.
+    episode with :meth:`SetPlan`. In a default Context it is ``plan``; by default the
+    robot stands.
     """
 
     def __init__(self, robot: Robot, plan: Plan | None = None) -> None:

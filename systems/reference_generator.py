@@ -73,7 +73,6 @@ class ReferenceGenerator(PlanProducer):
     labels: a cloned or reset Context repeats it exactly.
 
     Args:
-        robot: the robot.
         config: gait, seed and sampling.
         model: the motion model; the shipped one by default.
         horizon: how far to generate ahead of what has been used, s.
@@ -206,15 +205,12 @@ class ReferenceGenerator(PlanProducer):
             temperature=self._config.temperature,
             top_p=self._config.top_p,
         )
-        new = frames[0]
+        times = PLAN_DT * np.arange(count, count + frames.q.shape[1], dtype=np.float64)
         added = make_plan(
             self._robot,
-            q=new.q,
-            v=new.v,
-            contacts=new.contacts,
-            labels=new.labels,
+            **vars(frames[0]),
             start_time=count * PLAN_DT,
-            path_time=PLAN_DT * np.arange(count, count + len(new.q), dtype=np.float64),
+            path_time=times,
             open_ended=True,
         )
         lead = 0 if before.chunk else self._model.lead

@@ -39,7 +39,6 @@ class ToppraSmoother(PlanProducer):
     another plan, such as a player's new one, the system starts it at once.
 
     Args:
-        robot: the robot.
         config: chunk and look-ahead.
         limits: limits that replace the robot's own.
 

@@ -4,15 +4,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from loco_drake.common.arrays import Array
+from loco_drake.common.arrays import Array, read_only
 from loco_drake.common.rotations import quat_conjugate, quat_rotate
 from loco_drake.control.plan import Plan
-from loco_drake.control.state import (
-    JOINT_VELOCITIES,
-    JOINTS,
-    ORIENTATION,
-    VELOCITY,
-)
+from loco_drake.control.state import JOINT_VELOCITIES, JOINTS, ORIENTATION, VELOCITY
 from loco_drake.models.robots import Robot
 
 ACTION_SCALE = 0.15  # rad per unit of action: 15 Nm on both robots
@@ -25,11 +20,8 @@ def joint_targets(set_points: Array, action: Array) -> Array:
 
     q_d = set_points + ACTION_SCALE * action, and v_d = 0. The set-points contain the
     desired velocity, because Drake's CENIC integrator (1.51) applies v_d with the wrong
-    sign. The torque kp (q_d - q) - kd v is the same.
-
-    Args:
-        set_points: :func:`set_points` at the end of the control period, rad, (..., J).
-        action: the policy's action, shape (..., J).
+    sign. The torque kp (q_d - q) - kd v is the same. ``set_points`` (..., J), rad, are
+    :func:`set_points` at the end of the control period; ``action`` is (..., J).
     """
     q_d = set_points + ACTION_SCALE * action
     return np.concatenate((q_d, np.zeros_like(q_d)), axis=-1)
@@ -43,9 +35,8 @@ def set_points(robot: Robot, plan: Plan) -> Array:
     :func:`feed_forward_torques`.
     """
     torques = feed_forward_torques(robot, plan)
-    points = plan.q[JOINTS] + (robot.kd * plan.v[JOINT_VELOCITIES] + torques) / robot.kp
-    points.setflags(write=False)
-    return points
+    ahead = (robot.kd * plan.v[JOINT_VELOCITIES] + torques) / robot.kp
+    return read_only(plan.q[JOINTS] + ahead)
 
 
 def feed_forward_torques(robot: Robot, plan: Plan) -> Array:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from loco_drake.common.arrays import Array
+from loco_drake.common.arrays import Array, read_only
 from loco_drake.common.errors import InputError, check_number
 from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import quat_exp, quat_multiply, quat_rotate
@@ -70,8 +70,7 @@ class _Checked:
             if array.shape != (size,) or not inside.all():
                 between = "" if low == -inf else f" from {low:g} to {high:g}"
                 raise InputError(f"{name} must be {size} finite numbers{between}.")
-            array.setflags(write=False)
-            object.__setattr__(self, field.name, array)
+            object.__setattr__(self, field.name, read_only(array))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -113,10 +112,8 @@ class Domain(_Checked, Immutable):
     # Stiffness of the ground, N/m, in series with that of the feet.
     stiffness: float | None = None
     payload: float | None = None  # mass added to the trunk, kg
-    # Shift of the trunk's centre of mass in B, m, shape (3,).
-    com_shift: Array | None = None
-    # Torque of each motor over that of its model at the same set-point and state, shape
-    # (12,).
+    com_shift: Array | None = None  # of the trunk's centre of mass in B, m, shape (3,)
+    # Torque of each motor over its model's at equal set-point and state, shape (12,).
     strength: Array | None = None
     # Delay of the set-points, s, rounded to whole steps of the plant.
     latency: float = 0.0
@@ -150,14 +147,10 @@ def draw_error(errors: SensorErrors, sample: int) -> Array:
 
 
 def measure(state: Array, error: Array) -> Array:
-    """Returns measured states [q, v], shape (..., 37).
+    """Returns measured states for states [q, v] (..., 37), errors (..., ERROR_SIZE).
 
     The observation is computed from the measured state, so an encoder error affects
     every part that depends on it.
-
-    Args:
-        state: the plant's [q, v], shape (..., 37).
-        error: see :data:`ERROR_LAYOUT`, shape (..., ERROR_SIZE).
     """
     ends = np.cumsum([size for _, size in ERROR_LAYOUT])
     rotation, position, joints, w_B, v_B, joint_velocities = np.split(

@@ -5,14 +5,12 @@ heading frame H of the base, which has the base's heading and z up.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import yaw_of
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.state import ORIENTATION, POSITION
-
-Array = NDArray[np.float64]
 
 # The base swings within a stride; its mean over about two strides is its pace.
 _PACE_WINDOW = np.hanning(53)[1:-1]  # 1 s
@@ -62,8 +60,7 @@ def pace(velocity: Array) -> Array:
         convolve1d(a[:-1] + a[1:], _PACE_WINDOW, axis=0, mode="constant")
         for a in (between, weight)
     )
-    mean: Array = total / count
-    return mean
+    return total / count
 
 
 def filtered(

@@ -108,12 +108,8 @@ def observe(
 ) -> Array:
     """Returns observations, shape (..., OBSERVATION_SIZE).
 
-    Args:
-        robot: the robot.
-        ahead: the plan ahead.
-        state: [q, v] with a unit quaternion, shape (..., 37).
-        action: the action in use, shape (..., 12).
-        R_WB: the base's rotation matrix (..., 3, 3), if known.
+    ``state`` (..., 37) is [q, v] with a unit quaternion, ``action`` (..., 12) the one
+    in use, ``R_WB`` (..., 3, 3) the base's rotation matrix, if known.
     """
     q, v = split(state)
     robots = q[..., None, :]  # against the samples ahead

@@ -5,9 +5,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from loco_drake.common.arrays import Array, Bools, Integers
+from loco_drake.common.arrays import Array, Bools, Integers, read_only
 from loco_drake.common.errors import InputError
 from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import quat_conjugate, quat_rotate, yaw_of, yaw_quat
@@ -69,9 +68,9 @@ class Plan(Immutable):
                     f"{name} one that goes with that, not {given.shape}."
                 )
             # A copy, since the caller may hold the array or a view of it.
-            object.__setattr__(self, name, _read_only(given.astype(wanted)))
+            object.__setattr__(self, name, read_only(given.astype(wanted)))
         self._check_values()
-        object.__setattr__(self, "q", _read_only(unit_base(self.q)))
+        object.__setattr__(self, "q", read_only(unit_base(self.q)))
 
     def _check_values(self) -> None:
         """Raises InputError if an array has an invalid value."""
@@ -101,14 +100,14 @@ class Plan(Immutable):
     @cached_property
     def state(self) -> Array:
         """[q, v], shape (N, 13 + 2 J)."""
-        return _read_only(np.hstack((self.q, self.v)))
+        return read_only(np.hstack((self.q, self.v)))
 
     @cached_property
     def p_BoF_H(self) -> Array:
         """Toes relative to the base in its heading frame (z up), m, shape (N, 4, 3)."""
         q_HW = quat_conjugate(yaw_quat(yaw_of(self.q[ORIENTATION])))
         p_BoF_W = self.p_WF - self.q[POSITION][:, None]
-        return _read_only(quat_rotate(q_HW[:, None], p_BoF_W))
+        return read_only(quat_rotate(q_HW[:, None], p_BoF_W))
 
     @property
     def end_time(self) -> float:
@@ -126,11 +125,6 @@ class Plan(Immutable):
         """Returns the index of the sample nearest to ``time``, clamped to the plan."""
         k = round((time - self.start_time) / PLAN_DT)
         return min(max(k, 0), len(self) - 1)
-
-
-def _read_only(array: NDArray[Any]) -> NDArray[Any]:
-    array.setflags(write=False)
-    return array
 
 
 def make_plan(

@@ -233,7 +233,6 @@ def smooth_chunk(
     if last - start < (2 * chunk if raw.open_ended else 2 * PLAN_DT):
         return None
     end = min(start + 2 * chunk, last)
-    commit = min(start + chunk, last)
     # With a margin on both sides, the splines of consecutive windows agree.
     margin = 12 * PLAN_DT
     window = slice(
@@ -246,7 +245,7 @@ def smooth_chunk(
         limits,
         start=start,
         end=end,
-        commit=commit,
+        commit=min(start + chunk, last),
         start_rate=float(progress.rate[-1]),
     )
     if not begun:
@@ -254,7 +253,7 @@ def smooth_chunk(
         return Progress(plan, clock.rate, raw)
     # The first sample is the last committed one.
     clock = Clock(clock.path_time[1:], clock.rate[1:])
-    if not len(clock.path_time):
+    if not len(clock.rate):
         return None
     added = _follow(robot, raw, window, clock, progress.plan.end_time + PLAN_DT)
     plan = join_plans(progress.plan, added)

@@ -39,12 +39,8 @@ def reward_terms(
     - base pose: .15 exp(-20 e_p - 10 e_R), p_WB in the world, the rotation in so(3)
     - base velocity: .1 exp(-2 e_v - .2 e_w), in the world
 
-    Args:
-        robot: the robot.
-        plan_state: [q, v] of the plan, shape (..., 37).
-        plan_p_BoF_H: toes of the plan, as :attr:`Plan.p_BoF_H`, shape (..., 4, 3).
-        state: [q, v] of the robot with a unit quaternion, shape (..., 37).
-        R_WB: the base's rotation matrix (..., 3, 3), if known.
+    States (..., 37) are [q, v] with unit quaternions, ``plan_p_BoF_H`` (..., 4, 3) is
+    as :attr:`Plan.p_BoF_H`, ``R_WB`` (..., 3, 3) the base's rotation matrix, if known.
     """
     (q, v), (plan_q, plan_v) = split(state), split(plan_state)
     if R_WB is None:

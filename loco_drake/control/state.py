@@ -39,14 +39,11 @@ def split(state: Array) -> tuple[Array, Array]:
 
 
 def unit_base(state: Array) -> Array:
-    """Returns states or positions with unit base quaternions.
+    """Returns states [q, v] or positions q, (..., n), with unit base quaternions.
 
     Drake's discrete plants integrate the quaternion and never normalize it. Its norm
     grows by a few per cent in ten seconds of a trot. A quaternion that has length one
     up to rounding is returned unchanged, so the function is idempotent.
-
-    Args:
-        state: [q, v] or q, shape (..., n).
     """
     w, x, y, z = (state[..., i] for i in range(4))
     square = w * w + x * x + y * y + z * z
@@ -61,18 +58,12 @@ def unit_base(state: Array) -> Array:
 def has_fallen(robot: Robot, q: Array, R_WB: Array | None = None) -> Bools:
     """Returns whether the trunk touches the ground or tilts by more than 60 degrees.
 
-    Args:
-        robot: the robot.
-        q: positions, [q_WB as w x y z, p_WB, joints], shape (..., 19).
-        R_WB: the base's rotation matrix (..., 3, 3), if known.
-
-    Returns:
-        One bool for each robot, shape (...).
+    The result has one bool, shape (...), for each row of positions q, shape (..., 19).
+    R_WB is the base's rotation matrix (..., 3, 3), if known.
     """
-    # The world's z axis in the trunk's frame.
     if R_WB is None:
         R_WB = quat_to_matrix(q[ORIENTATION])
-    z_B = R_WB[..., 2, :]
+    z_B = R_WB[..., 2, :]  # the world's z axis in the trunk's frame
     lowest = q[..., HEIGHT] + (z_B @ (_CORNERS * robot.trunk_size).T).min(axis=-1)
     return (lowest <= 0) | (z_B[..., 2] < np.cos(_MAX_TILT))
 
@@ -100,9 +91,7 @@ class TerminationConfig:
     def exceeded(self, state: Array, plan_state: Array) -> Bools:
         """Returns whether each robot is too far from its plan to come back, (...).
 
-        Args:
-            state: the plant's [q, v], shape (..., 37).
-            plan_state: the same of the plan.
+        Both states are [q, v], shape (..., 37).
         """
         gap = np.linalg.norm(state[POSITION] - plan_state[POSITION], axis=-1)
         # A turn by an angle a takes a unit quaternion to one whose product with it is

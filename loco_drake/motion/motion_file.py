@@ -6,9 +6,10 @@ import sys
 import warnings
 import zipfile
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
+from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError, one_line, quoted
@@ -108,7 +109,9 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[Any]:
         raise ValueError("packed in a way that numpy does not")
     with archive.open(info) as member, warnings.catch_warnings():
         warnings.simplefilter("error")
-        shape, fortran, dtype = _array_header(member)
+        old = npy.read_magic(member) == (1, 0)
+        read = npy.read_array_header_1_0 if old else npy.read_array_header_2_0
+        shape, fortran, dtype = read(member)
         size = math.prod(shape) * dtype.itemsize
         if min(shape, default=0) < 0 or size != info.file_size - member.tell():
             raise ValueError("not of the size that it declares")
@@ -126,23 +129,14 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[Any]:
     return np.frombuffer(data, dtype).reshape(shape, order=order)  # type: ignore[call-overload]
 
 
-def _array_header(member: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    version = np.lib.format.read_magic(member)
-    if version == (1, 0):
-        return np.lib.format.read_array_header_1_0(member)
-    return np.lib.format.read_array_header_2_0(member)
-
-
 def _make(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Motion:
     """Returns the motion that a file describes."""
     version = header.get("schema_version")
     if type(version) is not int or version < 1:
         raise InputError("It has a damaged Motion header.")
     if version > SCHEMA_VERSION:
-        raise InputError(
-            f"It has Motion schema {version}; "
-            f"this version reads up to {SCHEMA_VERSION}."
-        )
+        newest = f"this version reads up to {SCHEMA_VERSION}"
+        raise InputError(f"It has Motion schema {version}; {newest}.")
     required = ("robot", "source", "gait", "fps", "joint_names")
     missing = [name for name in required if name not in header]
     if missing:
