@@ -24,11 +24,7 @@ class DataList:
     seed: UnusedSeed = 0
 
     def run(self) -> int:
-        """Prints the table; returns 0.
-
-        Raises:
-            InputError: if there is no data folder, or its segments.csv is damaged.
-        """
+        """Prints the table; returns 0."""
         from loco_drake.datasets.registry import DATASETS, data_dir
         from loco_drake.datasets.segments import read_segments
 
@@ -83,11 +79,7 @@ class DataInspect:
     seed: UnusedSeed = 0
 
     def run(self) -> int:
-        """Writes the picture and prints the table; returns 0.
-
-        Raises:
-            InputError: if the file is not of the source's format.
-        """
+        """Writes the picture and prints the table; returns 0."""
         from loco_drake.datasets.registry import read_clip
         from loco_drake.retargeting.inspection import clip_figure, summarize
 

@@ -82,19 +82,11 @@ class EvaluateTracking(Evaluation):
         from loco_drake.control.actor import load_actor
         from loco_drake.datasets.registry import data_dir
         from loco_drake.datasets.segments import read_segments
-        from loco_drake.evaluation.tracking_table import (
-            generated_trials,
-            retargeted_trials,
-        )
+        from loco_drake.evaluation import tracking_table
         from loco_drake.models.plant import PlantConfig
         from loco_drake.models.robots import get_robot
         from loco_drake.models.shipped import policy_path
-        from loco_drake.systems.scenario import (
-            GeneratedReference,
-            PlanReference,
-            Scenario,
-            TrainedPolicy,
-        )
+        from loco_drake.systems import scenario as systems
 
         robot = get_robot(name)
         weights = policy_path(robot, self.policy)
@@ -108,18 +100,19 @@ class EvaluateTracking(Evaluation):
             friction=self.friction,
         )
         plant.check()
-        scenario = Scenario(
-            robot=name, plant=plant, policy=TrainedPolicy(weights=weights)
-        )
+        policy = systems.TrainedPolicy(weights=weights)
+        scenario = systems.Scenario(robot=name, plant=plant, policy=policy)
         if self.reference == "retargeted":
-            scenario.reference = PlanReference()
+            scenario.reference = systems.PlanReference()
             segments = read_segments(data_dir(self.data_dir))
-            return scenario, retargeted_trials(
+            return scenario, tracking_table.retargeted_trials(
                 segments, labels, self.seeds, self.duration
             )
-        scenario.reference = GeneratedReference(gait=labels[0], duration=self.duration)
+        scenario.reference = systems.GeneratedReference(
+            gait=labels[0], duration=self.duration
+        )
         seeds = range(self.seed, self.seed + self.seeds)
-        return scenario, generated_trials(labels, seeds, self.duration)
+        return scenario, tracking_table.generated_trials(labels, seeds, self.duration)
 
     def _evaluate(
         self, name: str, scenario: "Scenario", trials: "list[Trial]"

@@ -38,11 +38,7 @@ class Evaluation:
     json: Json = None
 
     def run(self) -> int:
-        """Prints tables for each robot and writes the figures; returns the exit status.
-
-        Raises:
-            InputError: if an option is wrong, or there is nothing to evaluate.
-        """
+        """Prints tables and writes the figures; returns the exit status."""
         self.check()
         result = self.of_robots(self.robots())
         write_results(self.json, result)

@@ -45,12 +45,7 @@ class DataFetch:
     seed: UnusedSeed = 0
 
     def run(self) -> int:
-        """Fetches what is missing; returns 1 if a file failed, else 0.
-
-        Raises:
-            InputError: if an option is wrong, or the folder's segments.csv damaged.
-            OSError: if the folder cannot be written to.
-        """
+        """Fetches what is missing; returns 1 if a file failed, else 0."""
         from loco_drake.datasets import download, segments
         from loco_drake.datasets.registry import DATASETS, data_target
 

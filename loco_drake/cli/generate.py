@@ -43,24 +43,16 @@ class Generate:
     json: Json = None
 
     def run(self) -> int:
-        """Writes the files and prints the figures; returns 0.
-
-        Raises:
-            InputError: if an option is wrong.
-        """
-        from loco_drake.generation.generate import (
-            check_duration,
-            check_sampling,
-            generate_motions,
-        )
+        """Writes the files and prints the figures; returns 0."""
+        from loco_drake.generation import generate
         from loco_drake.generation.motion_model import load_motion_model
         from loco_drake.models.robots import ROBOTS
         from loco_drake.models.shipped import pretrained_path
 
         schedule = parse_schedule(self.gait)
-        check_duration(self.duration)
+        generate.check_duration(self.duration)
         schedule.check_ends_by(self.duration)
-        check_sampling(self.temperature, self.top_p, self.pace)
+        generate.check_sampling(self.temperature, self.top_p, self.pace)
         check_choice("robot", self.robot, ROBOTS)
         check_at_least("count", self.count, 1)
         check_at_least("seed", self.seed, 0)
@@ -73,7 +65,7 @@ class Generate:
         for first in range(self.seed, self.seed + self.count, BATCH):
             seeds = range(first, min(first + BATCH, self.seed + self.count))
             start = time.perf_counter()
-            motions = generate_motions(
+            motions = generate.generate_motions(
                 model,
                 schedule,
                 self.duration,

@@ -93,8 +93,9 @@ def _run(arguments: list[str]) -> int:
     check_choice("command", name, members or _COMMANDS)
     use_one_thread()
     command = command_class(name)
-    # A filter, since importing Drake resets the level.
-    logging.getLogger("drake").addFilter(_is_error)
+    # Lower levels tell of harmless properties of models. Importing Drake resets the
+    # level, but no filter.
+    logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.ERROR)
     prog = f"loco-drake {name}"
     parsed: Any = tyro.cli(command, prog=prog, args=rest)
     for option in _OUTPUTS:
@@ -113,15 +114,10 @@ def command_class(name: str) -> Any:
 
     ``--help`` thus does not import torch and Drake.
     """
-    module = import_module(
-        f"loco_drake.cli.{_MODULES.get(name, name.replace(' ', '_'))}"
+    module = _MODULES.get(name, name.replace(" ", "_"))
+    return getattr(
+        import_module(f"loco_drake.cli.{module}"), name.title().replace(" ", "")
     )
-    return getattr(module, name.title().replace(" ", ""))
-
-
-def _is_error(record: logging.LogRecord) -> bool:
-    """Returns False for messages about harmless properties of models."""
-    return record.levelno >= logging.ERROR
 
 
 def _print_help(names: list[str]) -> None:

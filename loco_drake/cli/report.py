@@ -34,11 +34,7 @@ class Report:
     json: Path | None = None
 
     def run(self) -> int:
-        """Makes the page; returns 0.
-
-        Raises:
-            InputError: if an option or a result is wrong; nothing is written then.
-        """
+        """Makes the page; returns 0."""
         from loco_drake.evaluation.report.page import build_report
         from loco_drake.evaluation.report.results import results_dir
         from loco_drake.generation.generate import check_duration

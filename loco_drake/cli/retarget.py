@@ -71,9 +71,6 @@ class Retarget:
         """Writes the files and prints the table; returns the exit status.
 
         It is 1 if a clip failed, or is outside its bounds with --strict, else 0.
-
-        Raises:
-            InputError: if an option is wrong, or FILE cannot be retargeted.
         """
         from loco_drake.datasets.registry import DATASETS
         from loco_drake.models.robot_files import load_robot

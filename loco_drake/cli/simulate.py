@@ -61,20 +61,15 @@ class Simulate:
         """Simulates, prints and writes; returns the exit status."""
         from loco_drake.control.plan import PLAN_DT
         from loco_drake.control.state import POSITION
-        from loco_drake.evaluation.tracking import (
-            FRAMES_PER_SECOND,
-            Recorder,
-            frame,
-            tracking_metrics,
-        )
+        from loco_drake.evaluation import tracking
 
         scenario, duration, motion = self._read()
         meshcat = self._start_meshcat()
         scenario.plant.visual = meshcat is not None
-        recorder = Recorder(scenario, meshcat)
+        recorder = tracking.Recorder(scenario, meshcat)
         recorder.start()
         if meshcat is not None:
-            meshcat.StartRecording(frames_per_second=FRAMES_PER_SECOND)
+            meshcat.StartRecording(frames_per_second=tracking.FRAMES_PER_SECOND)
         # The first evaluation of the networks sets up torch.
         recorder.diagram.GetOutputPort("action").Eval(recorder.context)
         start = time.perf_counter()
@@ -96,13 +91,13 @@ class Simulate:
             "duration_s": duration,
             "simulated_s": simulated,
             "fell": rollout.fell,
-            **tracking_metrics(rollout),
+            **tracking.tracking_metrics(rollout),
             "real_time_factor": simulated / wall,
         }
         if meshcat is not None:
             meshcat.StopRecording()
             meshcat.PublishRecording()
-            frame(meshcat, rollout.state[POSITION])
+            tracking.frame(meshcat, rollout.state[POSITION])
             if self.html is not None:
                 with atomic_path(self.html) as temporary:
                     temporary.write_text(meshcat.StaticHtml())
@@ -210,20 +205,11 @@ def _open_meshcat(port: int | None) -> "Meshcat":
 
 
 def _print(figures: dict[str, object]) -> None:
-    units = {
-        "normalized_return": "of 100",
-        "joint_rmse_rad": "rad",
-        "base_position_rmse_m": "m",
-        "base_orientation_rmse_rad": "rad",
-        "speed_mps": "m/s",
-        "duration_s": "s",
-        "simulated_s": "s",
-    }
+    units = {"_rad": "rad", "_mps": "m/s", "_m": "m", "_s": "s", "_return": "of 100"}
     rows = []
     for name, value in figures.items():
         text = f"{value:.3f}" if isinstance(value, float) else str(value)
-        title = name
-        for suffix in ("_rad", "_mps", "_m", "_s"):
-            title = title.removesuffix(suffix)
-        rows.append((title.replace("_", " "), text, units.get(name, "")))
+        suffix = next((suffix for suffix in units if name.endswith(suffix)), "")
+        title = name if suffix == "_return" else name.removesuffix(suffix)
+        rows.append((title.replace("_", " "), text, units.get(suffix, "")))
     print_table("Simulation", ("figure", "value", "unit"), rows)

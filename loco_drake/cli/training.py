@@ -42,11 +42,7 @@ class NetworkTraining(LoopSettings):
     json: Json = None
 
     def run(self) -> int:
-        """Trains, prints and writes; returns 1 if it was stopped early, else 0.
-
-        Raises:
-            InputError: if an option is wrong.
-        """
+        """Trains, prints and writes; returns 1 if it was stopped early, else 0."""
         from loco_drake.common.run_folder import check_folder
 
         self.check()

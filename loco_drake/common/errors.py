@@ -78,12 +78,7 @@ def check_bounds(
 ) -> None:
     """Raises InputError unless ``value`` is finite and from ``low`` to ``high``.
 
-    Args:
-        what: its name, which begins the sentence.
-        value: what was given.
-        low: the least that is allowed.
-        high: the most; infinity for no bound.
-        above: whether ``low`` itself is not allowed.
+    Its name ``what`` begins the sentence; ``above`` excludes ``low`` itself.
     """
     enough = value > low if above else value >= low
     if not (enough and value <= high and value != inf):
@@ -95,11 +90,7 @@ def check_bounds(
 def check_number(what: str, value: Any, low: float, high: float = inf) -> None:
     """Raises InputError unless ``value`` is a finite number from ``low`` to ``high``.
 
-    Args:
-        what: name of the value, which begins the sentence.
-        value: the value.
-        low: smallest valid value.
-        high: largest valid value; infinity for no bound.
+    In contrast to :func:`check_bounds` it may be of any type.
     """
     number = isinstance(value, Real) and not isinstance(value, bool)
     try:

@@ -82,16 +82,13 @@ def check_writable(path: Path | None, *, folder: bool = False) -> None:
     """
     if path is None:
         return
-    path = Path(path)
-    if folder:
-        path /= "any"
+    path = Path(path) / "any" if folder else Path(path)
     status = None if folder else _status(path)
     if status is not None and not os.access(path, os.W_OK):
         raise PermissionError(13, "No permission to write", str(path))
     if status is None or stat.S_ISREG(status.st_mode):
-        parent = Path(os.path.realpath(path)).parent
-        while not parent.exists():
-            parent = parent.parent
+        parents = Path(os.path.realpath(path)).parents
+        parent = next(folder for folder in parents if folder.exists())
         if not parent.is_dir():
             raise NotADirectoryError(20, "Not a folder", str(parent))
         if not os.access(parent, os.W_OK | os.X_OK):
@@ -102,10 +99,8 @@ def _status(path: Path) -> os.stat_result | None:
     """Returns the status of ``path``, links followed; None if it does not exist."""
     try:
         status = os.stat(path)
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return None
-    except NotADirectoryError:
-        return None  # atomic_path gives a better message
     if stat.S_ISDIR(status.st_mode):
         raise InputError(f"{str(path)!r} is a folder, not a file to be written.")
     return status
@@ -234,6 +229,4 @@ def figures_sha256(figures: Any) -> str:
 def cache_dir() -> Path:
     """Returns the cache folder: ``LOCO_DRAKE_CACHE`` if set, else the user's."""
     override = os.environ.get("LOCO_DRAKE_CACHE")
-    return (
-        Path(override) if override else Path(platformdirs.user_cache_dir("loco_drake"))
-    )
+    return Path(override or platformdirs.user_cache_dir("loco_drake"))

@@ -23,7 +23,6 @@ CHECKPOINT = "checkpoint.safetensors"
 
 # Scores of plans that have not been drawn yet are NaN.
 _MAY_BE_NAN = ("sampler/plan_scores", "sampler/plan_shares")
-
 Config = TypeVar("Config")
 
 
@@ -51,9 +50,8 @@ def read_checkpoint(path: Path, name: str) -> Checkpoint:
     tensors, header = load_weights(path, f"{name} checkpoint", _MAY_BE_NAN)
     if "config" in header:  # format of earlier trackers
         options = header["config"]["training"]
-        options["environment"]["position_penalty"] = options["environment"].pop(
-            "homing", 0.0
-        )
+        environment = options["environment"]
+        environment["position_penalty"] = environment.pop("homing", 0.0)
         run = settings(options, "steps")
         run["observation_layout"] = header["config"].get("observation_layout")
         header = {"state": header["state"], "run": run, "options": options}

@@ -86,35 +86,31 @@ def load_weights(
             header = parse_json((file.metadata() or {})["loco_drake"])
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         claimed = header.pop("content_sha256", None)
-        version, found, config = (
-            header.pop(key) for key in ("format_version", "kind", "config")
-        )
-        types = type(version), type(found), type(config)
-        if header or types != (int, str, dict):
+        types = {name: type(value) for name, value in header.items()}
+        if types != {"format_version": int, "kind": str, "config": dict}:
             raise ValueError("another header")
     except Exception:  # safetensors, its Rust and json raise many kinds
         raise InputError(
             f"{path} is damaged or is not a weights file of loco_drake."
         ) from None
-    if version != FORMAT_VERSION:
+    if header["format_version"] != FORMAT_VERSION:
         raise InputError(
-            f"{path} has weights format {version}; this version reads {FORMAT_VERSION}."
+            f"{path} has weights format {header['format_version']}; this version reads "
+            f"{FORMAT_VERSION}."
         )
-    if found != kind:
+    if header["kind"] != kind:
         raise InputError(
-            f"{path} holds {found} weights, but {kind} weights are needed."
+            f"{path} holds {header['kind']} weights, but {kind} weights are needed."
         )
-    header = {"format_version": version, "kind": found, "config": config}
     if claimed not in (None, _content_sha256(header, tensors)):
         raise InputError(f"{path} is damaged: its content does not match its hash.")
     for name, value in tensors.items():
         finite = not value.is_floating_point() or value.float().isfinite().all()
         if not finite and name not in may_be_nan:
             raise InputError(f"{path} is damaged: {quoted(name)} is not finite.")
-    return {
-        name: value.float() if value.dtype == torch.float16 else value
-        for name, value in tensors.items()
-    }, config
+        if value.dtype == torch.float16:
+            tensors[name] = value.float()
+    return tensors, header["config"]
 
 
 def load_into(module: torch.nn.Module, tensors: dict[str, Tensor], path: Path) -> None:
@@ -123,10 +119,7 @@ def load_into(module: torch.nn.Module, tensors: dict[str, Tensor], path: Path) -
     Raises:
         InputError: unless names, shapes and types are the module's.
     """
-    if _signature(module.state_dict()) != _signature(tensors):
-        raise InputError(
-            f"The weights in {path} do not fit the network that their header describes."
-        )
+    _check_fit(module, tensors, path)
     module.load_state_dict(tensors)
 
 
@@ -169,7 +162,7 @@ def build_network(
     path: Path,
     make: Callable[[Config], Network],
     config: Config,
-    tensors: Mapping[str, Tensor],
+    tensors: dict[str, Tensor],
 ) -> Network:
     """Returns the network that a header describes, with the weights of the file.
 
@@ -185,10 +178,10 @@ def build_network(
         raise InputError(
             f"{path} has a damaged header: no network can be built from it."
         ) from None
-    if _signature(planned.state_dict()) == _signature(tensors):
-        planned = make(config)
-    load_into(planned, dict(tensors), path)
-    return planned
+    _check_fit(planned, tensors, path)
+    network = make(config)
+    network.load_state_dict(tensors)
+    return network
 
 
 def save_network(
@@ -232,13 +225,18 @@ def load_network(
     tensors, config = load_weights(path, kind)
     network_config = read_config(config_class, config.get("network"), path)
     network = build_network(path, make, network_config, tensors)
-    network.eval()
-    network.requires_grad_(False)
-    return network
+    return network.eval().requires_grad_(False)
 
 
-def _signature(tensors: Mapping[str, Tensor]) -> dict[str, Any]:
-    return {name: (value.shape, value.dtype) for name, value in tensors.items()}
+def _check_fit(module: torch.nn.Module, tensors: dict[str, Tensor], path: Path) -> None:
+    own, given = (
+        {name: (value.shape, value.dtype) for name, value in of.items()}
+        for of in (module.state_dict(), tensors)
+    )
+    if own != given:
+        raise InputError(
+            f"The weights in {path} do not fit the network that their header describes."
+        )
 
 
 def _content_sha256(header: dict[str, Any], tensors: dict[str, Tensor]) -> str:
