@@ -6,13 +6,7 @@ import torch
 from pydrake.common.value import AbstractValue, Value
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import (
-    AbstractParameterIndex,
-    Context,
-    Diagram,
-    LeafSystem,
-    State,
-)
+from pydrake.systems.framework import Context, Diagram, LeafSystem, State
 
 from loco_drake.common.determinism import single_thread
 from loco_drake.control.action import joint_targets, set_points
@@ -41,7 +35,7 @@ class PlanPlayer(LeafSystem):
     def __init__(self, robot: Robot, plan: Plan | None = None) -> None:
         super().__init__()
         first = Value(plan or standing_plan(robot))
-        self._plan = AbstractParameterIndex(self.DeclareAbstractParameter(first))
+        self._plan = self.DeclareAbstractParameter(first)
         self.DeclareAbstractOutputPort("plan", first.Clone, self._calc)
 
     def SetPlan(self, context: Context, plan: Plan) -> None:
@@ -215,9 +209,9 @@ class JointTargets(_PlanFollower):
         plan = self._plan.Eval(context)
         action = self._action.Eval(context)
         due = set_points(self._robot, plan)[plan.index(context.get_time() + PLAN_DT)]
-        targets = state.get_mutable_discrete_state(int(self._targets))
-        targets.set_value(joint_targets(due, action))
-        state.get_mutable_discrete_state(int(self._held)).set_value(action)
+        targets = joint_targets(due, action)
+        state.get_mutable_discrete_state(self._targets).set_value(targets)
+        state.get_mutable_discrete_state(self._held).set_value(action)
 
 
 class TrackingReward(_PlanFollower):

@@ -13,13 +13,7 @@ from pydrake.common.value import Value
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import BodyIndex
-from pydrake.systems.framework import (
-    AbstractParameterIndex,
-    Context,
-    Diagram,
-    DiscreteValues,
-    LeafSystem,
-)
+from pydrake.systems.framework import Context, Diagram, DiscreteValues, LeafSystem
 
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
@@ -47,8 +41,7 @@ class DomainSystem(LeafSystem):
 
     def __init__(self) -> None:
         super().__init__()
-        default = Value(Domain())
-        self._index = AbstractParameterIndex(self.DeclareAbstractParameter(default))
+        self._index = self.DeclareAbstractParameter(Value(Domain()))
 
     def SetDomain(self, context: Context, domain: Domain) -> None:
         """Sets the domain in ``context``, which is this system's own."""
@@ -102,7 +95,7 @@ class Actuation(DomainSystem):
         self._state = self.DeclareVectorInputPort("state", 13 + 2 * joints)
         # Set-points of recent steps, newest first; NaN before the first.
         rows = round(MAX_LATENCY / plant.time_step) + 1
-        self._past = int(self.DeclareDiscreteState(np.full(rows * joints, np.nan)))
+        self._past = self.DeclareDiscreteState(np.full(rows * joints, np.nan))
         self.DeclarePeriodicDiscreteUpdateEvent(plant.time_step, 0.0, self._remember)
         self.DeclareVectorOutputPort("desired_state", 2 * joints, self._calc)
 
@@ -211,17 +204,11 @@ class Sensors(DomainSystem):
 def SetDomain(diagram: Diagram, context: Context, domain: Domain) -> None:
     """Sets a domain in the Context of a locomotion diagram.
 
-    Ground, trunk and rotors that the domain does not specify keep their values in
-    ``context``.
-
-    Args:
-        diagram: contains the systems of :func:`.diagram.AddLocomotion`, including the
-            disturbances that the domain needs.
-        context: the diagram's.
-        domain: the domain.
+    Ground, trunk and rotors that the domain does not specify keep their values. The
+    diagram contains the systems of :func:`.diagram.AddLocomotion`.
 
     Raises:
-        InputError: if the diagram lacks a system that the domain needs.
+        InputError: if the diagram lacks a disturbance that the domain needs.
     """
     for name in DISTURBING_SYSTEMS:
         if domain.needs(name) and not diagram.HasSubsystemNamed(name):
@@ -233,20 +220,14 @@ def SetDomain(diagram: Diagram, context: Context, domain: Domain) -> None:
     plant_context = plant.GetMyMutableContextFromRoot(context)
     if domain.friction is not None or domain.stiffness is not None:
         scene_graph = diagram.GetSubsystemByName("scene_graph")
-        SetGround(
-            plant,
-            scene_graph,
-            scene_graph.GetMyMutableContextFromRoot(context),
-            friction=domain.friction,
-            stiffness=domain.stiffness,
-        )
+        ground = scene_graph.GetMyMutableContextFromRoot(context)
+        contact = {"friction": domain.friction, "stiffness": domain.stiffness}
+        SetGround(plant, scene_graph, ground, **contact)
     if domain.payload is not None or domain.com_shift is not None:
-        SetTrunkLoad(
-            plant.GetBodyByName(robot.trunk_frame, instance),
-            plant_context,
-            mass=domain.payload or 0.0,
-            p_shift_B=np.zeros(3) if domain.com_shift is None else domain.com_shift,
-        )
+        trunk = plant.GetBodyByName(robot.trunk_frame, instance)
+        shift = np.zeros(3) if domain.com_shift is None else domain.com_shift
+        mass = domain.payload or 0.0
+        SetTrunkLoad(trunk, plant_context, mass=mass, p_shift_B=shift)
     if domain.strength is not None:
         actuation = diagram.GetSubsystemByName("actuation")
         inertia = actuation.reflected_inertia(domain.strength)

@@ -16,13 +16,11 @@ class PlanProducer(LeafSystem):
     """
 
     def _DeclarePlan(self, first: Any, *inputs: DependencyTicket) -> None:
-        """Declares state, port and update.
+        """Declares state, by default ``first``, port and update.
 
-        Args:
-            first: the default state.
-            inputs: tickets of input ports on which the plan depends, too.
+        ``inputs`` are tickets of input ports on which the plan depends, too.
         """
-        self._index = int(self.DeclareAbstractState(Value(first)))
+        self._index = self.DeclareAbstractState(Value(first))
         self.DeclareAbstractOutputPort(
             "plan",
             lambda: Value(first.plan),

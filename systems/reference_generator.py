@@ -105,10 +105,8 @@ class ReferenceGenerator(PlanProducer):
     ) -> None:
         """Restarts from plan time 0; see :func:`.simulator.StartEpisode`.
 
-        Args:
-            context: this system's own.
-            gait: a gait label or a schedule; the configured one by default.
-            seed: seed of the tokens; the configured one by default.
+        Gait, a label or a schedule, and seed are the configured ones by default.
+        ``context`` is this system's own.
 
         Raises:
             InputError: if a value is out of its bounds.

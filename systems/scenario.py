@@ -148,13 +148,9 @@ class Scenario:
     def check(self) -> None:
         """Raises InputError unless every field is valid."""
         check_choice("robot", self.robot, ROBOTS)
-        self.plant.check()
-        if isinstance(self.reference, GeneratedReference):
-            self.reference.check()
-        if self.steering is not None:
-            self.steering.check()
-        if self.smoother is not None:
-            self.smoother.check()
+        for part in (self.plant, self.reference, self.steering, self.smoother):
+            if not isinstance(part, MotionReference | PlanReference | None):
+                part.check()
         rate = self.simulator.target_realtime_rate
         check_number("The simulator's target_realtime_rate", rate, 0.0)
         if repr(self.simulator) != repr(SimulatorConfig(target_realtime_rate=rate)):
