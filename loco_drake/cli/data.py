@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import tyro
 
 from loco_drake.cli.options import DataDir, Json, UnusedSeed
-from loco_drake.cli.output import print_table, write_json
-from loco_drake.common.files import atomic_path
+from loco_drake.cli.output import print_table, write_figure, write_json
 
 if TYPE_CHECKING:
     from loco_drake.retargeting.inspection import ClipSummary
@@ -89,11 +88,9 @@ class DataInspect:
         summary, contacts = summarize(clip)
         stretch = f"{self.file.stem}-{clip.provenance['frames']}"
         out = self.out or Path(f"{stretch}.png")
-        with atomic_path(out) as temporary:
-            clip_figure(clip, contacts, stretch).savefig(temporary, dpi=100)
-        write_json(
-            self.json, {**asdict(summary), "licence": clip.provenance["licence"]}
-        )
+        write_figure(clip_figure(clip, contacts, stretch), out, dpi=100)
+        licence = clip.provenance["licence"]
+        write_json(self.json, {**asdict(summary), "licence": licence})
         print_table(f"{stretch}, drawn in {out}", ["", "value"], _rows(summary))
         return 0
 

@@ -50,14 +50,9 @@ class EvaluateGeneration(Effort, Evaluation):
 
     def of_robot(self, name: str) -> dict[str, Any]:
         """Returns the figures of one robot."""
+        from loco_drake.evaluation import model_figures
         from loco_drake.evaluation.generation import score_generation
         from loco_drake.evaluation.generation_pictures import generation_figures
-        from loco_drake.evaluation.model_figures import (
-            add_model_figures,
-            cut_for_scoring,
-            generate_for_scoring,
-            known_labels,
-        )
         from loco_drake.evaluation.recorded import load_to_score
         from loco_drake.generation.motion_model import load_motion_model
         from loco_drake.models.robots import get_robot
@@ -72,7 +67,7 @@ class EvaluateGeneration(Effort, Evaluation):
         model = other = None
         if self.motions is not None:
             motions = load_to_score(self.motions, robot, self.labels)
-            generated = cut_for_scoring(motions)
+            generated = model_figures.cut_for_scoring(motions)
             if beyond := {str(m.label) for m in motions if m.label not in LABELS}:
                 say(
                     f"Motions of {', '.join(sorted(beyond))} are left out of all "
@@ -80,17 +75,19 @@ class EvaluateGeneration(Effort, Evaluation):
                 )
         else:
             model = load_motion_model(paths["tokenizer"], paths["generator"], name)
-            known = known_labels(model, labels)
+            known = model_figures.known_labels(model, labels)
         recorded = self.retarget(robot)
         if model is not None:
             others = [n for n in model.tokenizer.config.robots if n != name]
             other = self.retarget(get_robot(others[0])) if others else None
             say(f"Generating {', '.join(map(str, known))}")
-            generated = generate_for_scoring(model, known, self, self.seed)
+            generated = model_figures.generate_for_scoring(
+                model, known, self, self.seed
+            )
         figures, recognition = score_generation(
             robot, recorded, generated, self, self.seed, say
         )
-        add_model_figures(figures, model, labels, recorded, other)
+        model_figures.add_model_figures(figures, model, labels, recorded, other)
         if model is not None:
             figures["validation_trained_on"] = trained_on(paths, recorded, name)
         if self.figures is not None:

@@ -108,25 +108,18 @@ def say_of(robot: str) -> Callable[[str], None]:
 def trained_on(
     paths: Mapping[str, Path], recorded: "Recorded", robot: str
 ) -> dict[str, list[str] | None]:
-    """Returns validation recordings that weights were trained on, with a warning.
+    """Returns validation subjects that weights were trained on, and warns of them.
 
-    Args:
-        paths: weights by kind, "tokenizer" or "generator".
-        recorded: retargeted recordings.
-        robot: named in the warning.
-
-    Returns:
-        Names of subjects by kind; None where the weights do not say.
+    They are by kind, "tokenizer" or "generator", as the paths are; None where the
+    weights do not say.
     """
-    from loco_drake.generation.training_motions import (
-        read_training_record,
-        seen_in_training,
-    )
+    from loco_drake.generation import training_motions
 
     result = {}
     for kind, path in paths.items():
-        record = read_training_record(path, kind)
-        seen = result[kind] = seen_in_training(record, recorded.validation)
+        record = training_motions.read_training_record(path, kind)
+        seen = training_motions.seen_in_training(record, recorded.validation)
+        result[kind] = seen
         if seen is None:
             say_of(robot)(f"What the {kind} was trained on is not recorded in {path}.")
         elif seen:
@@ -138,13 +131,7 @@ def trained_on(
 def print_by_label(
     title: str, kinds: Sequence[str], rows: Mapping[str, Mapping[str, Any]]
 ) -> None:
-    """Prints figures, row by row, in the columns that the report has for them.
-
-    Args:
-        title: over the table.
-        kinds: of columns, as ``report.yaml`` calls them.
-        rows: figures by label.
-    """
+    """Prints figures by label, in columns of the ``kinds`` in the report's content."""
     from loco_drake.evaluation.report.content import CONTENT
     from loco_drake.evaluation.report.results import Figures
     from loco_drake.evaluation.report.tables import figures_table

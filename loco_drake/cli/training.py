@@ -65,10 +65,7 @@ class NetworkTraining(LoopSettings):
 def parse_resumed(command: Any, prog: str, args: Sequence[str]) -> Any:
     """Returns a command that resumes; options that are not given are those of the run.
 
-    Args:
-        command: as parsed with the defaults of its class.
-        prog: its name.
-        args: its arguments.
+    ``command`` was parsed from the same arguments with the defaults of its class.
 
     Raises:
         InputError: if there is no sound checkpoint of such a training, or an option

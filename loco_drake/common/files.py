@@ -70,14 +70,14 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 
 def check_writable(path: Path | None, *, folder: bool = False) -> None:
-    """Checks before any work whether its result can be written.
+    """Checks before any work whether its result, if any, can be written.
 
     Args:
-        path: the path; None to skip the check.
-        folder: whether ``path`` is a folder for files rather than a file.
+        path: of the result, or of the folder for its files.
+        folder: whether it is a folder.
 
     Raises:
-        InputError: if a file is a folder.
+        InputError: if it is a folder and should not be.
         OSError: if an existing path is not writable, or a parent folder is a file.
     """
     if path is None:

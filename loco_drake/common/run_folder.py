@@ -38,11 +38,7 @@ class Checkpoint:
 
 
 def read_checkpoint(path: Path, name: str) -> Checkpoint:
-    """Reads a checkpoint.
-
-    Args:
-        path: the file.
-        name: name of the training: "tracker", "tokenizer", ...
+    """Reads a checkpoint of the training ``name``: "tracker", "tokenizer", ...
 
     Raises:
         InputError: if the file is missing, damaged, or of another training.
@@ -148,13 +144,9 @@ def check_folder(folder: Path, weights: str, resume: bool) -> None:
 def check_same(
     saved: Checkpoint, run: Mapping[str, Any], options: Iterable[str], steps: int
 ) -> None:
-    """Raises InputError unless a checkpoint matches ``run``.
+    """Raises InputError unless a checkpoint matches ``run``, see :func:`open_run`.
 
-    Args:
-        saved: the checkpoint.
-        run: see :func:`open_run`; names that the checkpoint lacks are not compared.
-        options: the names in ``run`` that are options.
-        steps: total steps.
+    Names that the checkpoint lacks are not compared; ``options`` are names of options.
     """
     folder = str(saved.path.parent)
     differ = [name for name in run if saved.run.get(name, run[name]) != run[name]]

@@ -124,13 +124,9 @@ def load_into(module: torch.nn.Module, tensors: dict[str, Tensor], path: Path) -
 
 
 def read_config(config_class: type[Config], values: Any, path: Path) -> Config:
-    """Returns a dataclass from a header, with each field checked.
+    """Returns a dataclass from a header's JSON, with each field checked.
 
-    Args:
-        config_class: see :func:`.typed.convert`; ``BEFORE`` holds former names of its
-            fields.
-        values: the fields as JSON.
-        path: the file, for messages.
+    ``BEFORE``, if the dataclass has it, maps former names of fields to their names.
 
     Raises:
         InputError: if a field is unknown, missing, of the wrong type, or an invalid
@@ -192,14 +188,9 @@ def save_network(
     *,
     half: bool = False,
 ) -> None:
-    """Writes a network for :func:`load_network`.
+    """Writes a network for :func:`load_network`; see :func:`save_weights`.
 
-    Args:
-        path: the file.
-        kind: kind of weights.
-        network: a module whose ``config`` is a dataclass.
-        info: JSON for readers of the header.
-        half: see :func:`save_weights`.
+    The module has a dataclass ``config``; ``info`` is JSON for readers of the header.
     """
     config = {"network": asdict(network.config), "info": info or {}}
     save_weights(path, kind, network.state_dict(), config, half=half)
@@ -211,13 +202,7 @@ def load_network(
     make: Callable[[Config], Network],
     config_class: type[Config],
 ) -> Network:
-    """Returns the network in a weights file, ready for inference.
-
-    Args:
-        path: the file.
-        kind: expected kind of weights.
-        make: returns the network for a config.
-        config_class: dataclass of the config, stored as "network" in the file.
+    """Returns the network that :func:`save_network` wrote, ready for inference.
 
     Raises:
         InputError: if the file is missing, damaged, or of another kind.
