@@ -4,11 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from pydrake.systems.analysis import (
-    ExtractSimulatorConfig,
-    Simulator,
-    SimulatorStatus,
-)
+from pydrake.systems.analysis import ExtractSimulatorConfig, Simulator, SimulatorStatus
 from pydrake.systems.framework import Context, Diagram
 
 from loco_drake.common.errors import InputError

@@ -99,22 +99,15 @@ def preview(plan: Plan, time: float) -> Preview:
     return Preview(plan.q[k], plan.v[k], plan.contacts[k], plan.labels[now])
 
 
-def observe(
-    robot: Robot,
-    ahead: Preview,
-    state: Array,
-    action: Array,
-    R_WB: Array | None = None,
-) -> Array:
+def observe(robot: Robot, ahead: Preview, state: Array, action: Array) -> Array:
     """Returns observations, shape (..., OBSERVATION_SIZE).
 
     ``state`` (..., 37) is [q, v] with a unit quaternion, ``action`` (..., 12) the one
-    in use, ``R_WB`` (..., 3, 3) the base's rotation matrix, if known.
+    in use.
     """
     q, v = split(state)
     robots = q[..., None, :]  # against the samples ahead
-    if R_WB is None:
-        R_WB = quat_to_matrix(q[ORIENTATION])
+    R_WB = quat_to_matrix(q[ORIENTATION])
     R_WH = heading_matrix(R_WB)
     parts = (
         -R_WB[..., 2, :],

@@ -22,11 +22,7 @@ REWARD_WEIGHTS = np.array([0.5, 0.05, 0.2, 0.15, 0.1])
 
 
 def reward_terms(
-    robot: Robot,
-    plan_state: Array,
-    plan_p_BoF_H: Array,
-    state: Array,
-    R_WB: Array | None = None,
+    robot: Robot, plan_state: Array, plan_p_BoF_H: Array, state: Array
 ) -> Array:
     """Returns the five weighted terms of the reward, (..., 5); their sum is at most 1.
 
@@ -40,11 +36,10 @@ def reward_terms(
     - base velocity: .1 exp(-2 e_v - .2 e_w), in the world
 
     States (..., 37) are [q, v] with unit quaternions, ``plan_p_BoF_H`` (..., 4, 3) is
-    as :attr:`Plan.p_BoF_H`, ``R_WB`` (..., 3, 3) the base's rotation matrix, if known.
+    as :attr:`Plan.p_BoF_H`.
     """
     (q, v), (plan_q, plan_v) = split(state), split(plan_state)
-    if R_WB is None:
-        R_WB = quat_to_matrix(q[ORIENTATION])
+    R_WB = quat_to_matrix(q[ORIENTATION])
     p_BoF_H = robot.toe_positions(q[JOINTS]) @ (
         np.swapaxes(R_WB, -1, -2) @ heading_matrix(R_WB)
     )

@@ -55,15 +55,13 @@ def unit_base(state: Array) -> Array:
     return result
 
 
-def has_fallen(robot: Robot, q: Array, R_WB: Array | None = None) -> Bools:
+def has_fallen(robot: Robot, q: Array) -> Bools:
     """Returns whether the trunk touches the ground or tilts by more than 60 degrees.
 
     The result has one bool, shape (...), for each row of positions q, shape (..., 19).
-    R_WB is the base's rotation matrix (..., 3, 3), if known.
     """
-    if R_WB is None:
-        R_WB = quat_to_matrix(q[ORIENTATION])
-    z_B = R_WB[..., 2, :]  # the world's z axis in the trunk's frame
+    # The world's z axis in the trunk's frame.
+    z_B = quat_to_matrix(q[ORIENTATION])[..., 2, :]
     lowest = q[..., HEIGHT] + (z_B @ (_CORNERS * robot.trunk_size).T).min(axis=-1)
     return (lowest <= 0) | (z_B[..., 2] < np.cos(_MAX_TILT))
 

@@ -3,13 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.common.rotations import quat_to_matrix
 from loco_drake.control.action import joint_targets, set_points
 from loco_drake.control.domain import Domain, draw_error, measure
 from loco_drake.control.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.reward import reward_terms
-from loco_drake.control.state import ORIENTATION, POSITION, has_fallen, split, unit_base
+from loco_drake.control.state import POSITION, has_fallen, split, unit_base
 from loco_drake.models.robots import get_robot
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.physics import OwnWorld, SharedWorld
@@ -59,7 +58,6 @@ class TrackingBatch:
         self.penalty = np.zeros(count)  # of its last step, for distance and falls
         self._last = np.zeros(count, dtype=np.int64)
         self._state = np.zeros((count, 37))
-        self._R_WB = np.zeros((count, 3, 3))
         self._action = np.zeros((count, 12))
 
     def reset(
@@ -84,7 +82,6 @@ class TrackingBatch:
         self._last[i] = min(sample + steps, length - 1)
         wanted = self._plans[plan].state[sample]
         self._state[i] = self._config.reset_noise.draw(wanted, random)
-        self._R_WB[i] = quat_to_matrix(self._state[i][ORIENTATION])
         self._action[i] = 0.0
         domain = self._config.randomization.draw(
             self._robot, random, sample * PLAN_DT, self._last[i] * PLAN_DT
@@ -107,10 +104,9 @@ class TrackingBatch:
             self._state[i] = self._worlds[i].advance(state, desired_state[i])
         self._state = unit_base(self._state)
         wanted, toes = self._wanted[now], self._toes[now]
-        self._R_WB = quat_to_matrix(self._state[ORIENTATION])
-        terms = reward_terms(self._robot, wanted, toes, self._state, self._R_WB)
+        terms = reward_terms(self._robot, wanted, toes, self._state)
         gap = (self._state - wanted)[POSITION][:, :2]
-        fallen = has_fallen(self._robot, split(self._state)[0], self._R_WB)
+        fallen = has_fallen(self._robot, split(self._state)[0])
         self.penalty = self._config.position_penalty * np.linalg.norm(gap, axis=1)
         self.penalty += self._config.fall_cost * fallen
         lost = fallen | self._config.termination.exceeded(self._state, wanted)
@@ -126,19 +122,16 @@ class TrackingBatch:
         rows = first[:, None] + ahead
         q, v = split(self._wanted[rows])
         shown = Preview(q, v, self._contacts[rows], self._labels[first + sample])
-        state, R_WB = self._measured(robots)
-        observations = observe(self._robot, shown, state, self._action[robots], R_WB)
-        return observations.astype(np.float32)
+        state, action = self._measured(robots), self._action[robots]
+        return observe(self._robot, shown, state, action).astype(np.float32)
 
-    def _measured(
-        self, robots: NDArray[np.int64] | slice
-    ) -> tuple[Array, Array | None]:
-        """Returns states as robots measure them, and rotation matrices if known."""
+    def _measured(self, robots: NDArray[np.int64] | slice) -> Array:
+        """Returns states as robots measure them."""
         if self._config.randomization.noise is None:
-            return self._state[robots], self._R_WB[robots]
+            return self._state[robots]
         errors = []
         for i in np.arange(len(self._state))[robots]:
             sensors = self._domains[i].sensors
             assert sensors is not None
             errors.append(draw_error(sensors, int(self.sample[i])))
-        return measure(self._state[robots], np.array(errors)), None
+        return measure(self._state[robots], np.array(errors))
