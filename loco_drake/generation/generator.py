@@ -6,6 +6,7 @@ residual codebooks refine one another.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -184,20 +185,25 @@ class Generator(nn.Module):
             present.append(kv)
         return self.norm(x), present
 
-    def head(self, codebook: int, hidden: Tensor, earlier: Tensor) -> Tensor:
-        """Returns logits (..., codebook_size) of one codebook.
+    def heads(
+        self, hidden: Tensor, choose: Callable[[int, Tensor], Tensor]
+    ) -> tuple[Tensor, Tensor]:
+        """Returns logits (..., codebooks, codebook_size) and codes (..., codebooks).
 
-        Takes the trunk's output and the sum of :meth:`drawn` over the codebooks before.
+        Args:
+            hidden: output of the trunk, shape (..., width).
+            choose: returns the codes (...) of a codebook, given its index and logits;
+                later heads see them.
         """
-        seen = self.head_in[codebook](hidden) + earlier
-        logits: Tensor = self.head_out[codebook](seen)
-        return logits
-
-    def drawn(self, codebook: int, codes: Tensor) -> Tensor:
-        """Returns the embedding of sampled codes (...) for later heads."""
-        first = codebook * (self.config.codebook_size + 1)
-        told: Tensor = self.earlier_books(codes + first)
-        return told
+        earlier = torch.zeros_like(hidden)
+        logits, codes = [], []
+        for codebook in range(self.config.codebooks):
+            seen = self.head_in[codebook](hidden) + earlier
+            logits.append(self.head_out[codebook](seen))
+            codes.append(choose(codebook, logits[-1]))
+            first = codebook * (self.config.codebook_size + 1)
+            earlier = earlier + self.earlier_books(codes[-1] + first)
+        return torch.stack(logits, dim=-2), torch.stack(codes, dim=-1)
 
     def forward(
         self,
@@ -213,12 +219,8 @@ class Generator(nn.Module):
         on ``codes`` of earlier codebooks. For the arguments see :meth:`trunk`.
         """
         hidden, _ = self.trunk(before, labels, speed_bins, duration)
-        earlier = torch.zeros_like(hidden)
-        logits = []
-        for codebook in range(self.config.codebooks):
-            logits.append(self.head(codebook, hidden, earlier))
-            earlier = earlier + self.drawn(codebook, codes[..., codebook])
-        return torch.stack(logits, dim=-2)
+        logits, _ = self.heads(hidden, lambda codebook, _: codes[..., codebook])
+        return logits
 
     @torch.inference_mode()
     def sample(
@@ -247,37 +249,28 @@ class Generator(nn.Module):
         batch, steps, codebooks = uniforms.shape
         if history.shape[1] == 0:
             history = torch.full((batch, 1, codebooks), self.config.codebook_size)
-        given = history.shape[1]
-        hidden, cache = self.trunk(history, labels[:, :given], speed_bins, duration)
-        hidden = hidden[:, -1]
-        tokens = []
-        for step in range(steps):
-            earlier = torch.zeros_like(hidden)
-            codes = []
-            for codebook in range(codebooks):
-                logits = self.head(codebook, hidden, earlier)
-                drawn = draw(logits, uniforms[:, step, codebook], temperature, top_p)
-                codes.append(drawn)
-                if codebook < codebooks - 1:
-                    earlier = earlier + self.drawn(codebook, drawn)
-            token = torch.stack(codes, dim=-1)[:, None]  # (B, 1, codebooks)
-            tokens.append(token)
-            if step < steps - 1:
-                label = labels[:, given + step, None]
-                hidden, cache = self.trunk(token, label, speed_bins, duration, cache)
-                hidden = hidden[:, -1]
+        tokens: list[Tensor] = []
+        before, seen, cache = history, 0, None
+
+        def choose(codebook: int, logits: Tensor) -> Tensor:
+            dice = uniforms[:, len(tokens), codebook]
+            return draw(logits, dice, temperature, top_p)
+
+        while len(tokens) < steps:
+            told = labels[:, seen : seen + before.shape[1]]
+            hidden, cache = self.trunk(before, told, speed_bins, duration, cache)
+            seen += before.shape[1]
+            _, codes = self.heads(hidden[:, -1], choose)
+            before = codes[:, None]  # (B, 1, codebooks)
+            tokens.append(before)
         return torch.cat(tokens, dim=1)
 
 
 def draw(logits: Tensor, uniforms: Tensor, temperature: float, top_p: float) -> Tensor:
-    """Samples codes (B,) by nucleus sampling (Holtzman et al. 2020).
+    """Samples codes (B,) of logits (B, N) by nucleus sampling (Holtzman et al. 2020).
 
-    Args:
-        logits: shape (B, N).
-        uniforms: in [0, 1), shape (B,); the code is where the cumulated probability
-            of the codes, likeliest first, passes it.
-        temperature: see :meth:`Generator.sample`.
-        top_p: see there.
+    A code is where the cumulated probability of the codes, likeliest first, passes the
+    uniform number (B,). For temperature and top_p see :meth:`Generator.sample`.
     """
     if temperature == 0:
         return logits.argmax(dim=-1)

@@ -1,5 +1,6 @@
 """A motion model generates endless motion chunk by chunk."""
 
+import math
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -97,14 +98,13 @@ class MotionModel:
         self.robot: Robot = get_robot(robot)
         self.frames_per_token = tokenizer.config.frames_per_token
         self.chunk_tokens = round(CHUNK_SECONDS * FPS / self.frames_per_token)
+        self.chunk_frames = self.chunk_tokens * self.frames_per_token
+        # Tokens at the beginning of a stream that only give context.
+        settling = math.ceil(SETTLING / self.frames_per_token)
+        self.lead = max(tokenizer.memory, settling)
         self._robot_index = tokenizer.config.robots.index(robot)
         known = generator.config.labels
         self._known = {i for i, label in enumerate(LABELS) if str(label) in known}
-
-    @property
-    def chunk_frames(self) -> int:
-        """Frames per chunk, about one second."""
-        return self.chunk_tokens * self.frames_per_token
 
     def start(
         self,
@@ -191,11 +191,6 @@ class MotionModel:
         """Decodes tokens (B, n, codebooks), of labels (B, n), that continue ``stream``.
 
         For an empty stream, the frames of the first ``lead`` tokens are not returned.
-
-        Args:
-            stream: the stream, which is not modified.
-            tokens: shape (B, n, codebooks).
-            labels: of the tokens, shape (B, n).
         """
         before = stream.tokens.shape[1]
         window = np.concatenate((stream.tokens, tokens), axis=1)
@@ -242,11 +237,6 @@ class MotionModel:
             labels=frame_labels[:, self.frames_per_token - 1 : -1],
         )
         return after, frames
-
-    @property
-    def lead(self) -> int:
-        """Tokens at the beginning of a stream that only give context."""
-        return max(self.tokenizer.memory, -(-SETTLING // self.frames_per_token))
 
     def _settle(
         self, footing: Footing, features: Array

@@ -142,9 +142,9 @@ class RandomizationConfig:
         """
 
         def uniform(bounds: Any, size: int | None = None) -> Any:
-            return (
-                None if bounds is None else random.uniform(bounds[0], bounds[1], size)
-            )
+            if bounds is None:
+                return None
+            return random.uniform(bounds[0], bounds[1], size)
 
         log_stiffness = self.stiffness and np.log(self.stiffness)
         friction, stiffness = uniform(self.friction), uniform(log_stiffness)
@@ -156,7 +156,13 @@ class RandomizationConfig:
             strength=uniform(self.motor_strength, 12),
             latency=uniform(self.latency) or 0.0,
             pushes=self._draw_pushes(robot, random, start, end),
-            sensors=self._draw_errors(random),
+            sensors=None
+            if self.noise is None
+            else SensorErrors(
+                bias=self.noise * BIAS * random.standard_normal(len(BIAS)),
+                white=self.noise * WHITE,
+                seed=int(random.integers(2**32)),
+            ),
         )
 
     def _draw_pushes(
@@ -176,15 +182,6 @@ class RandomizationConfig:
             pushes.append(Push(start=begin, duration=PUSH_DURATION, force_W=force))
             time += random.uniform(*self.push_interval)
         return tuple(pushes)
-
-    def _draw_errors(self, random: np.random.Generator) -> SensorErrors | None:
-        if self.noise is None:
-            return None
-        return SensorErrors(
-            bias=self.noise * BIAS * random.standard_normal(len(BIAS)),
-            white=self.noise * WHITE,
-            seed=int(random.integers(2**32)),
-        )
 
 
 STANDARD = RandomizationConfig(

@@ -3,7 +3,7 @@
 import json
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -136,7 +136,9 @@ def train_tracker(
             writer = TensorBoardOutputFormat(str(folder))
             learner.set_logger(Logger(None, [writer]))
             with stop_requests() as stop_requested:
-                saver = _Saver(held, log, sampler, config, report, stop_requested)
+                saver = _Saver(
+                    held, log, sampler, config, report, stop_requested, steps_before
+                )
                 if learner.num_timesteps < config.steps:
                     learner.learn(
                         config.steps - learner.num_timesteps,
@@ -221,60 +223,54 @@ def _restore(learner: AdaptivePPO, sampler: PlanSampler, saved: Checkpoint) -> N
         learner.rate = float(saved.state["learning_rate"])
 
 
+@dataclass(eq=False)
 class _Saver(BaseCallback):
     """Saves and reports after each update, and stops on request."""
 
-    def __init__(
-        self,
-        run: RunFolder,
-        log: Path,
-        sampler: PlanSampler,
-        config: TrainingConfig,
-        report: Report,
-        stop_requested: Event,
-    ) -> None:
+    run: RunFolder
+    log: Path
+    sampler: PlanSampler
+    config: TrainingConfig
+    report: Report
+    stop_requested: Event
+    saved_steps: int
+
+    def __post_init__(self) -> None:
         super().__init__()
-        self.saved_steps = run.saved.state["steps"] if run.saved else 0
-        self._run = run
-        self._log = log
-        self._sampler = sampler
-        self._config = config
-        self._report = report
-        self._stop_requested = stop_requested
-        self._start = time.monotonic()
+        self.start = time.monotonic()
 
     def _on_step(self) -> bool:
-        return not self._stop_requested.is_set()
+        return not self.stop_requested.is_set()
 
     def _on_rollout_start(self) -> None:
         if self.num_timesteps == self.saved_steps:
             return
         # The update for the last batch has just been done.
         assert isinstance(self.model, AdaptivePPO)
-        scores = self._sampler.score_by_label()
+        scores = self.sampler.score_by_label()
         for label, score in scores.items():
             self.logger.record(f"return/{label}", score)
         episodes = self.model.ep_info_buffer
         if episodes:
             lengths = [episode["l"] for episode in episodes]
             self.logger.record("return/episode_steps", float(np.mean(lengths)))
-        line = {"steps": self.num_timesteps, "seconds": time.monotonic() - self._start}
+        line = {"steps": self.num_timesteps, "seconds": time.monotonic() - self.start}
         for name, value in self.logger.name_to_value.items():
             line[name] = float(value)
         self.logger.dump(self.num_timesteps)
-        with self._log.open("a") as log:
+        with self.log.open("a") as log:
             log.write(json.dumps(line) + "\n")
         self.save(self.model)
-        self._report(self.num_timesteps, scores)
+        self.report(self.num_timesteps, scores)
 
     def save(self, learner: AdaptivePPO) -> None:
         """Writes the checkpoint and the policy."""
-        self._run.save(*_state(learner, self._sampler))
+        self.run.save(*_state(learner, self.sampler))
         self.saved_steps = learner.num_timesteps
         actor = ActorConfig(
-            robot=self._config.environment.robot,
-            labels=[str(ROW_LABELS[i]) for i in self._sampler.present],
-            hidden=self._config.ppo.hidden,
-            privileged=self._config.ppo.privileged,
+            robot=self.config.environment.robot,
+            labels=[str(ROW_LABELS[i]) for i in self.sampler.present],
+            hidden=self.config.ppo.hidden,
+            privileged=self.config.ppo.privileged,
         )
-        save_actor(export_actor(learner, actor), self._log.parent / POLICY)
+        save_actor(export_actor(learner, actor), self.log.parent / POLICY)
