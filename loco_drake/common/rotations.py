@@ -117,6 +117,13 @@ def yaw_quat(yaw: Array) -> Array:
     return np.stack((np.cos(yaw / 2), zero, zero, np.sin(yaw / 2)), axis=-1)
 
 
+def rotate_plane(vectors: Array, angles: Array) -> Array:
+    """Returns plane vectors (..., 2) turned by ``angles`` (...) rad."""
+    cos, sin = np.cos(angles), np.sin(angles)
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack((cos * x - sin * y, sin * x + cos * y), axis=-1)
+
+
 def quat_continuous(q: Array) -> Array:
     """Returns a sequence (T, 4) with signs flipped so that neighbours agree."""
     dots = (q[1:] * q[:-1]).sum(axis=-1)

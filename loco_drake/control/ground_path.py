@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import convolve1d
 
 from loco_drake.common.arrays import Array
-from loco_drake.common.rotations import yaw_of
+from loco_drake.common.rotations import rotate_plane, yaw_of
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.state import ORIENTATION, POSITION
 
@@ -16,13 +16,6 @@ from loco_drake.control.state import ORIENTATION, POSITION
 _PACE_WINDOW = np.hanning(53)[1:-1]  # 1 s
 # A critically damped filter has covered 90 % of a step after this many time constants.
 _NINETY_PERCENT = 3.8897
-
-
-def rotate(vectors: Array, angles: Array) -> Array:
-    """Returns vectors (..., 2) turned by ``angles`` (...), rad."""
-    cos, sin = np.cos(angles), np.sin(angles)
-    x, y = vectors[..., 0], vectors[..., 1]
-    return np.stack((cos * x - sin * y, sin * x + cos * y), axis=-1)
 
 
 def ground_pose(q: Array) -> Array:
@@ -34,7 +27,7 @@ def ground_pose(q: Array) -> Array:
 def path_velocity(pose: Array) -> Array:
     """Returns the velocity between consecutive poses, m/s and rad/s, (N - 1, 3)."""
     turn = np.diff(pose[:, 2])
-    step_H = rotate(np.diff(pose[:, :2], axis=0), -(pose[:-1, 2] + turn / 2))
+    step_H = rotate_plane(np.diff(pose[:, :2], axis=0), -(pose[:-1, 2] + turn / 2))
     return np.column_stack((step_H, turn)) / PLAN_DT
 
 
@@ -45,7 +38,7 @@ def integrate(start: Array, velocity: Array) -> Array:
     """
     turn = velocity[:, 2] * PLAN_DT
     yaw = start[2] + np.cumsum(turn)
-    step_W = rotate(velocity[:, :2] * PLAN_DT, yaw - turn / 2)
+    step_W = rotate_plane(velocity[:, :2] * PLAN_DT, yaw - turn / 2)
     return np.column_stack((start[:2] + np.cumsum(step_W, axis=0), yaw))
 
 

@@ -9,18 +9,19 @@ follow in closed form.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array, Bools
 from loco_drake.common.errors import InputError
+from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import (
     angular_velocity,
     quat_conjugate,
     quat_continuous,
     quat_multiply,
     quat_rotate,
+    rotate_plane,
     yaw_quat,
 )
 from loco_drake.control.ground_path import (
@@ -29,13 +30,10 @@ from loco_drake.control.ground_path import (
     integrate,
     pace,
     path_velocity,
-    rotate,
 )
 from loco_drake.control.plan import PLAN_DT, Plan, make_plan
 from loco_drake.control.state import JOINTS, ORIENTATION, POSITION
 from loco_drake.models.robots import Robot
-
-Array = NDArray[np.float64]
 
 # No command beyond these is followed; most gaits end far below.
 MOST_COMMAND = np.array([4.0, 2.0, 4.0])  # m/s, m/s, rad/s
@@ -48,8 +46,8 @@ _SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Steered:
-    """A steered plan and what is needed to steer it on. It is immutable.
+class Steered(Immutable):
+    """A steered plan and what is needed to steer it on.
 
     The arrays have one row for each sample of the plan.
     """
@@ -63,9 +61,6 @@ class Steered:
     # From where each toe would be if it moved with the base to where it is, m in W,
     # shape (N, 4, 2).
     offset: Array
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Steered":
-        return self
 
     def speed_at(self, path_time: float) -> Array:
         """Returns the velocity that the plan has at this plan time, shape (3,)."""
@@ -170,7 +165,7 @@ def _bend(
         (before.pose[: last + 1], integrate(before.pose[last], velocity))
     )
     turn = pose[:, 2] - raw_pose[:, 2]
-    carried = pose[:, None, :2] + rotate(
+    carried = pose[:, None, :2] + rotate_plane(
         raw.p_WF[..., :2] - raw_pose[:, None, :2], turn[:, None]
     )
     offset = np.stack(
@@ -245,27 +240,29 @@ def _foot_offset(
             here = max(start, last)
             placed = carried[here] + old[here]
             angle = turn[here, None]
-            offset[span] = placed + rotate(toe[span] - toe[here], angle) - carried[span]
+            offset[span] = (
+                placed + rotate_plane(toe[span] - toe[here], angle) - carried[span]
+            )
         else:
             middle = (start + end) / 2
             if end == len(toe) - 1 and raw.open_ended:
                 middle = max(middle, start + usual / 2)
             angle = _between(turn[:, None], middle)
             from_, to = (_between(p[:, :2], middle) for p in (raw_pose, pose))
-            offset[span] = to + rotate(toe[span] - from_, angle) - carried[span]
-            there = rotate(slope_toe[start], angle[0]) - slope_carried[start]
+            offset[span] = to + rotate_plane(toe[span] - from_, angle) - carried[span]
+            there = rotate_plane(slope_toe[start], angle[0]) - slope_carried[start]
             offset[begun + 1 : start] = _hermite(
                 offset[begun], slope, offset[start], there, start - begun
             )
         begun, usual = end, end - start
-        slope = rotate(slope_toe[end], angle[0]) - slope_carried[end]
+        slope = rotate_plane(slope_toe[end], angle[0]) - slope_carried[end]
     if begun < len(toe) - 1:
         left = len(toe) - begun
         offset[begun + 1 :] = _hermite(offset[begun], slope, 0 * slope, 0 * slope, left)
     return offset
 
 
-def _stances(contact: NDArray[np.bool_], last: int) -> Iterator[tuple[int, int]]:
+def _stances(contact: Bools, last: int) -> Iterator[tuple[int, int]]:
     """Yields first and last sample of the stances that end after sample ``last``."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], contact, [False]))))
     for start, end in zip(edges[::2], edges[1::2] - 1, strict=True):
@@ -286,5 +283,4 @@ def _between(rows: Array, index: float) -> Array:
     """Returns the row of (N, D) at a fractional index, by linear interpolation."""
     low = min(int(index), len(rows) - 1)
     high = min(low + 1, len(rows) - 1)
-    row: Array = rows[low] + (index - low) * (rows[high] - rows[low])
-    return row
+    return rows[low] + (index - low) * (rows[high] - rows[low])

@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError
-from loco_drake.common.rotations import quat_conjugate, quat_multiply, yaw_of, yaw_quat
+from loco_drake.common.rotations import (
+    quat_conjugate,
+    quat_multiply,
+    rotate_plane,
+    yaw_of,
+    yaw_quat,
+)
 from loco_drake.models.robots import Robot
 from loco_drake.motion.motion import FPS, Motion
 
@@ -78,10 +84,3 @@ def _roll_pitch(q_WB: Array, yaw: Array) -> Array:
     roll = np.arctan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
     pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
     return np.stack((roll, pitch), axis=-1)
-
-
-def rotate_plane(vectors: Array, angles: Array) -> Array:
-    """Returns plane vectors (..., 2) turned by ``angles`` (...) rad."""
-    cos, sin = np.cos(angles), np.sin(angles)
-    x, y = vectors[..., 0], vectors[..., 1]
-    return np.stack((cos * x - sin * y, sin * x + cos * y), axis=-1)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.common.rotations import quat_conjugate, quat_rotate
+from loco_drake.common.rotations import quat_conjugate, quat_rotate, rotate_plane
 from loco_drake.generation import features as ft
-from loco_drake.generation.features import positions, rotate_plane
+from loco_drake.generation.features import positions
 from loco_drake.models.robots import Robot
 from loco_drake.motion.motion import FPS
 

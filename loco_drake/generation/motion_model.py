@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from loco_drake.common.determinism import single_thread, uniforms
 from loco_drake.common.errors import InputError
 from loco_drake.common.immutable import Immutable
-from loco_drake.common.rotations import quat_error
-from loco_drake.generation.features import rotate_plane
+from loco_drake.common.rotations import quat_error, rotate_plane
 from loco_drake.generation.footing import Footing, start_footing, step_footing
 from loco_drake.generation.generator import Generator, duration_bin, load_generator
 from loco_drake.generation.speed_rank import drawn_rank, rank_bin

@@ -67,15 +67,13 @@ def in_robot_order(motion: Motion) -> Motion:
             + (f", not {quoted(foreign[0])}." if foreign else ".")
         )
     order = [motion.joint_names.index(name) for name in names]
+    reordered = f"reordered from {', '.join(motion.joint_names)}"
     return replace(
         motion,
         joint_names=names,
         joint_positions=motion.joint_positions[:, order],
         joint_velocities=motion.joint_velocities[:, order],
-        provenance={
-            **motion.provenance,
-            "joints": f"reordered from {', '.join(motion.joint_names)}",
-        },
+        provenance={**motion.provenance, "joints": reordered},
     )
 
 

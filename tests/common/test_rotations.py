@@ -85,6 +85,14 @@ def test_headings():
     assert np.isfinite(mut.heading_matrix(straight_up)).all()
 
 
+def test_vectors_turn_in_the_plane():
+    random = np.random.default_rng(2)
+    vectors, angles = random.standard_normal((5, 2)), random.uniform(-7, 7, 5)
+    turns = Rotation.from_euler("z", angles)
+    expected = turns.apply(np.pad(vectors, ((0, 0), (0, 1))))[:, :2]
+    np.testing.assert_allclose(mut.rotate_plane(vectors, angles), expected, atol=1e-12)
+
+
 def test_signs_are_made_continuous(quaternions):
     q = mut.quat_continuous(quaternions)
     assert ((q[1:] * q[:-1]).sum(axis=1) >= 0).all()

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from loco_drake.common.rotations import rotate_plane
 from loco_drake.generation import features as ft
 
 
@@ -21,6 +22,6 @@ def integrate_path(robot, features, pose):
     turn = features[..., ft.YAW_RATE][..., 0] / ft.FPS
     yaw = pose[..., None, 2] + np.cumsum(turn, axis=-1)
     step_H = features[..., ft.VELOCITY] * robot.stand_height / ft.FPS
-    steps = ft.rotate_plane(step_H, yaw - turn / 2)
+    steps = rotate_plane(step_H, yaw - turn / 2)
     xy = pose[..., None, :2] + np.cumsum(steps, axis=-2)
     return np.concatenate((xy, yaw[..., None]), axis=-1)
