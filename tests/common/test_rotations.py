@@ -88,7 +88,7 @@ def test_headings():
 def test_vectors_turn_in_the_plane():
     random = np.random.default_rng(2)
     vectors, angles = random.standard_normal((5, 2)), random.uniform(-7, 7, 5)
-    turns = Rotation.from_euler("z", angles)
+    turns = Rotation.from_rotvec(np.outer(angles, [0, 0, 1]))
     expected = turns.apply(np.pad(vectors, ((0, 0), (0, 1))))[:, :2]
     np.testing.assert_allclose(mut.rotate_plane(vectors, angles), expected, atol=1e-12)
 
