@@ -5,10 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rich.console import Console
-
 from loco_drake.cli.options import DataDir, Json, UnusedSeed
-from loco_drake.cli.output import print_failed, print_table, write_results
+from loco_drake.cli.output import print_failed, print_table, say, write_results
 from loco_drake.common.errors import InputError, check_at_least, check_choice, one_line
 from loco_drake.motion.gaits import parse_label
 
@@ -101,8 +99,7 @@ class Evaluation:
 
 def say_of(robot: str) -> Callable[[str], None]:
     """Returns a function that prints progress for a robot on stderr."""
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
-    return lambda text: console.print(f"{robot}: {text}", markup=False)
+    return lambda text: say(f"{robot}: {text}")
 
 
 def trained_on(

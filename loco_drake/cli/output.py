@@ -70,9 +70,16 @@ def tracked(items: Iterable[Item], what: str, total: int) -> Iterable[Item]:
     return track(items, what, total, console=console, transient=True, disable=hidden)
 
 
+def say(text: str) -> None:
+    """Prints one line on stderr."""
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    console.print(one_line(text), markup=False)
+
+
 def print_failed(failed: Iterable[tuple[str, str]]) -> None:
     """Prints failed clips and the reasons on stderr."""
-    _print_of_clips("Failed", failed)
+    for name, reason in failed:
+        say(f"Failed: {name}: {reason}")
 
 
 # Behind the name of a row whose figures are outside their bounds.
@@ -80,17 +87,8 @@ MARK = " (!)"
 
 
 def print_warnings(warnings: Mapping[str, Sequence[str]]) -> None:
-    """Prints clips outside their bounds, and the figures, on stdout and stderr.
-
-    Args:
-        warnings: sentences by clip; nothing is printed if there is none.
-    """
+    """Prints how many clips are outside their bounds, and on stderr how, by clip."""
     if warnings:
         print(f"(!) Outside their bounds, see the warnings: {len(warnings)}")
-    _print_of_clips("Warning", ((k, "; ".join(v)) for k, v in warnings.items()))
-
-
-def _print_of_clips(what: str, texts: Iterable[tuple[str, str]]) -> None:
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
-    for name, text in texts:
-        console.print(one_line(f"{what}: {name}: {text}"), markup=False)
+    for name, sentences in warnings.items():
+        say(f"Warning: {name}: {'; '.join(sentences)}")

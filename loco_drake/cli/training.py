@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import tyro
-from rich.console import Console
 
 from loco_drake.cli.options import Json
-from loco_drake.cli.output import print_table, write_json
+from loco_drake.cli.output import print_table, say, write_json
 from loco_drake.common.errors import InputError
 from loco_drake.generation.loop_settings import LoopSettings
 
@@ -91,7 +90,5 @@ def parse_resumed(command: Any, prog: str, args: Sequence[str]) -> Any:
 def print_stopped(done: int, steps: int) -> int:
     """Prints how to resume on stderr; returns the exit status of unfinished work."""
     how = "the same command with --resume goes on" if done else "nothing is saved yet"
-    Console(stderr=True, highlight=False).print(
-        f"Stopped after {done} of {steps} steps; {how}."
-    )
+    say(f"Stopped after {done} of {steps} steps; {how}.")
     return 1
