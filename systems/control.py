@@ -78,8 +78,8 @@ def FindRobot(diagram: Diagram) -> tuple[Robot, MultibodyPlant, ModelInstanceInd
     return robot, plant, plant.GetModelInstanceByName(robot.name)
 
 
-class _PlanFollower(LeafSystem):
-    """Base of systems with an input port ``plan``."""
+class PlanFollower(LeafSystem):
+    """Base of systems with an input port ``plan``, of a robot."""
 
     def __init__(self, robot: Robot) -> None:
         super().__init__()
@@ -93,7 +93,7 @@ class _PlanFollower(LeafSystem):
         return plan, plan.index(context.get_time())
 
 
-class PlanState(_PlanFollower):
+class PlanState(PlanFollower):
     """Outputs the plan's current state and path time.
 
     .. pydrake_system::
@@ -121,7 +121,7 @@ class PlanState(_PlanFollower):
         output[0] = plan.path_time[k]
 
 
-class Observation(_PlanFollower):
+class Observation(PlanFollower):
     """Outputs the observation of the policy, see :func:`observe`.
 
     .. pydrake_system::
@@ -174,7 +174,7 @@ class TrackingPolicy(LeafSystem):
             output.set_value(self._actor(observation).double().numpy())
 
 
-class JointTargets(_PlanFollower):
+class JointTargets(PlanFollower):
     """Computes the PD set-points at 50 Hz and holds them in between.
 
     .. pydrake_system::
@@ -214,7 +214,7 @@ class JointTargets(_PlanFollower):
         state.get_mutable_discrete_state(self._held).set_value(action)
 
 
-class TrackingReward(_PlanFollower):
+class TrackingReward(PlanFollower):
     """Outputs the terms of the reward, see :func:`reward_terms`.
 
     .. pydrake_system::

@@ -98,15 +98,12 @@ def MakeLocomotionDiagram(
 
     The subsystems are named plant, scene_graph, robot_state, reference, steering,
     smoother, observation, policy, joint_targets, plan_state and reward; the scenario's
-    disturbances add actuation, pushes and sensors. A robot must start on its plan, so
-    simulate it like this::
+    disturbances add actuation, pushes and sensors. ``meshcat`` shows the robot and the
+    plan's keypoints.
 
-        simulator = MakeSimulator(diagram, scenario)
-        StartEpisode(simulator)
-        simulator.AdvanceTo(10.0)
-
-    Drake never frees a diagram that contains systems written in Python. Reuse one
-    diagram for all episodes. ``meshcat`` shows the robot and the plan's keypoints.
+    A robot must start on its plan: use :func:`.simulator.MakeSimulator` and
+    :func:`.simulator.StartEpisode`. Drake never frees a diagram that contains systems
+    written in Python, so reuse one diagram for all episodes.
 
     Raises:
         InputError: if the scenario is invalid.

@@ -1,15 +1,15 @@
 """The system that draws a plan as spheres in Meshcat."""
 
 import numpy as np
-from pydrake.common.value import Value
 from pydrake.geometry import Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, LeafSystem
+from pydrake.systems.framework import Context
 
 from loco_drake.common.rotations import quat_rotate
-from loco_drake.control.plan import standing_plan
 from loco_drake.control.state import ORIENTATION, POSITION
 from loco_drake.models.robots import Robot
+
+from .control import PlanFollower
 
 # Those of the paper's Figure 1.
 _FRONT = Rgba(0.1, 0.3, 0.9)
@@ -19,7 +19,7 @@ NAMES = ("FL_toe", "FR_toe", "RL_toe", "RR_toe", "withers", "hip")
 COLORS = (_FRONT, _FRONT, _REAR, _REAR, _TRUNK, _TRUNK)
 
 
-class KeypointVisualizer(LeafSystem):
+class KeypointVisualizer(PlanFollower):
     """Draws the plan's toes, withers and hip in Meshcat.
 
     .. pydrake_system::
@@ -36,23 +36,20 @@ class KeypointVisualizer(LeafSystem):
     def __init__(
         self, robot: Robot, meshcat: Meshcat, path: str = "plan", period: float = 1 / 64
     ) -> None:
-        super().__init__()
+        super().__init__(robot)
         self._meshcat = meshcat
         self._paths = [f"{path}/{name}" for name in NAMES]
         x = np.abs(robot.p_BHip[:, 0]).mean()
         self._p_BK = np.array([[x, 0.0, 0.06], [-x, 0.0, 0.06]])
-        self._plan = self.DeclareAbstractInputPort("plan", Value(standing_plan(robot)))
         for name, color in zip(self._paths, COLORS, strict=True):
             meshcat.SetObject(name, Sphere(robot.foot_radius), color)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._publish)
         self.DeclareForcedPublishEvent(self._publish)
 
     def _publish(self, context: Context) -> None:
-        time = context.get_time()
-        plan = self._plan.Eval(context)
-        k = plan.index(time)
+        plan, k = self._now(context)
         q = plan.q[k]
         trunk = q[POSITION] + quat_rotate(q[ORIENTATION], self._p_BK)
         points = np.concatenate((plan.p_WF[k], trunk))
         for path, p_W in zip(self._paths, points, strict=True):
-            self._meshcat.SetTransform(path, RigidTransform(p_W), time)
+            self._meshcat.SetTransform(path, RigidTransform(p_W), context.get_time())
