@@ -10,21 +10,19 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from sklearn.linear_model import LogisticRegression
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 from torch import Tensor, nn
 from torch.nn import functional
 
+from loco_drake.common.arrays import Array, Integers
 from loco_drake.common.determinism import single_thread
 from loco_drake.common.weights import load_network, save_network
 from loco_drake.evaluation.samples import CHANNELS, FRAMES, Samples, label_weights
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.training import LoopResult, train
 from loco_drake.motion.gaits import LABELS
-
-Array = NDArray[np.float64]
 
 BATCH = 48
 STEPS = 300
@@ -107,7 +105,7 @@ def embeddings(classifier: GaitClassifier, channels: Array) -> Array:
     return out.reshape(*channels.shape[:-2], -1)
 
 
-def predict(classifier: GaitClassifier, channels: Array) -> NDArray[np.int64]:
+def predict(classifier: GaitClassifier, channels: Array) -> Integers:
     """Returns the likeliest label's index in config.labels, shape (...)."""
     embedded = torch.tensor(embeddings(classifier, channels), dtype=torch.float32)
     with torch.inference_mode(), single_thread():
@@ -160,9 +158,7 @@ def train_classifier(
     return classifier, result
 
 
-def class_indices(
-    labels: NDArray[np.int64], names: tuple[str, ...]
-) -> NDArray[np.int64]:
+def class_indices(labels: Integers, names: tuple[str, ...]) -> Integers:
     """Returns the position in ``names`` of each index into LABELS, -1 if absent."""
     known = map(str, LABELS)
     return np.array([names.index(k) if k in names else -1 for k in known])[labels]

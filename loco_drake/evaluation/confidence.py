@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-Array = NDArray[np.float64]
+from loco_drake.common.arrays import Array
 
 RESAMPLES = 1000
 _Z = float(norm.ppf(0.975))

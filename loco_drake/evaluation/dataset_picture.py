@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from sklearn.decomposition import PCA
 from sklearn.preprocessing import StandardScaler
 
+from loco_drake.common.arrays import Array
 from loco_drake.datasets.split import TRAIN, VALIDATION
 from loco_drake.generation.features import SIZE, motion_features
 from loco_drake.models.robots import get_robot
@@ -20,8 +20,6 @@ from loco_drake.motion.gait_timing import gait_timing, motion_track
 from loco_drake.motion.gaits import GAITS, LABELS, SOURCES, GaitLabel
 from loco_drake.motion.motion import Motion
 from loco_drake.retargeting.trajectories import trajectories
-
-Array = NDArray[np.float64]
 
 # A colour for each source, a marker for each gait.
 _TABLEAU = ("tab:blue", "tab:orange", "tab:green", "tab:red")

@@ -17,13 +17,11 @@ Distance to the nearest recording
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
+from loco_drake.common.arrays import Array
 from loco_drake.evaluation.samples import subject_of
 from loco_drake.motion.motion import FPS, Motion
-
-Array = NDArray[np.float64]
 
 EPSILON = 1e-6
 OVERLAP = 1.0  # s

@@ -25,9 +25,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.distance import pdist
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import yaw_of
 from loco_drake.evaluation.motion_scores import mean_speed
 from loco_drake.evaluation.samples import cut
@@ -35,8 +35,6 @@ from loco_drake.models.robots import Robot
 from loco_drake.motion.gait_timing import motion_track, stride_period
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.quality import stance_slip_median, toe_trajectories
-
-Array = NDArray[np.float64]
 
 SECONDS = 60.0
 WINDOW = 10.0

@@ -19,14 +19,12 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array, Bools
 from loco_drake.generation.features import VELOCITY, motion_features
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import GaitSchedule
 from loco_drake.motion.motion import Motion
-
-Array = NDArray[np.float64]
 
 AROUND = 0.5  # s
 SMOOTHED = 0.5  # s over which the picture's speed is averaged
@@ -99,7 +97,7 @@ def change_figure(robot: Robot, motion: Motion, schedule: GaitSchedule) -> Figur
     return figure
 
 
-def _stretches(stands: Sequence[bool] | NDArray[np.bool_], fps: float) -> Array:
+def _stretches(stands: Sequence[bool] | Bools, fps: float) -> Array:
     """Returns start and length in s of each stretch of True, shape (N, 2)."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], stands, [0]))))
     starts, ends = edges[::2], edges[1::2]

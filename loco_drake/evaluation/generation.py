@@ -6,7 +6,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from loco_drake.common.errors import InputError
@@ -37,8 +36,6 @@ from loco_drake.evaluation.two_sample import FOLDS, two_sample_accuracy
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import Motion
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array, Integers
 from loco_drake.common.rotations import (
     quat_conjugate,
     quat_multiply,
@@ -20,8 +20,6 @@ from loco_drake.evaluation.samples import by_label
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import Motion
-
-Array = NDArray[np.float64]
 
 POSES = 8  # stick figures in a strip
 STRIP_SECONDS = 0.7
@@ -87,7 +85,7 @@ def draw_confusions(
         axes.set_title(title)
 
 
-def code_use_figure(counts: NDArray[np.int64], title: str) -> Figure:
+def code_use_figure(counts: Integers, title: str) -> Figure:
     """Returns how often the codes of each codebook are used, the most used first.
 
     The counts have the shape (codebooks, codebook_size).

@@ -22,9 +22,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import gmean, wasserstein_distance
 
+from loco_drake.common.arrays import Array
 from loco_drake.generation.features import VELOCITY, motion_features
 from loco_drake.models.robots import Robot
 from loco_drake.motion.motion import Motion
@@ -33,8 +33,6 @@ from loco_drake.motion.quality import (
     stance_slip_speeds,
     toe_trajectories,
 )
-
-Array = NDArray[np.float64]
 
 # Of a label without generated motion.
 NULL_FIGURES: dict[str, Any] = dict.fromkeys(

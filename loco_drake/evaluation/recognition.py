@@ -24,9 +24,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn import metrics
 
+from loco_drake.common.arrays import Array, Integers
 from loco_drake.evaluation.classifier import (
     LEARNING_RATE,
     STEPS,
@@ -47,12 +47,8 @@ from loco_drake.evaluation.samples import (
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.motion.gaits import LABELS, SOURCES
 
-Array = NDArray[np.float64]
-Labels = NDArray[np.int64]
-
-
 # Returns the label, as index into LABELS, of each side of samples, shape (N, 2).
-Recognizer = Callable[[Samples], Labels]
+Recognizer = Callable[[Samples], Integers]
 # Trains a classifier on samples, with a seed.
 Fit = Callable[[Samples, int], Recognizer]
 
@@ -80,9 +76,9 @@ class TransformerRecognizer:
         if result.stopped:
             raise KeyboardInterrupt
 
-    def __call__(self, samples: Samples) -> Labels:
+    def __call__(self, samples: Samples) -> Integers:
         """Returns the label of each side, shape (N, 2)."""
-        found: Labels = self._labels[predict(self.classifier, samples.channels)]
+        found: Integers = self._labels[predict(self.classifier, samples.channels)]
         return found
 
 
@@ -95,7 +91,7 @@ class Recognition:
     # By row, how often (share) each label was taken for which: shape (labels, labels),
     # rows are the truth.
     confusion: dict[str, Array]
-    labels: Labels  # those of the rows and columns, index into LABELS
+    labels: Integers  # those of the rows and columns, index into LABELS
     # The classifiers that were trained on recordings, one a seed.
     of_recordings: tuple[Recognizer, ...]
 
@@ -132,7 +128,7 @@ def recognize(
     everything = join(generated)
     counts = count_per_label(train)
     of_recordings = []
-    answers: dict[str, list[Labels]] = {}
+    answers: dict[str, list[Integers]] = {}
     for run, seed in enumerate(seeds):
         place = f"run {run + 1} of {len(seeds)}:"
         say(f"{place} learning from recordings")
@@ -161,7 +157,7 @@ def recognize(
     return Recognition(accuracies, confusion, present, tuple(of_recordings))
 
 
-def _accuracies(answers: Labels, tested: Samples) -> dict[str, Estimate]:
+def _accuracies(answers: Integers, tested: Samples) -> dict[str, Estimate]:
     """Returns accuracies of answers (runs, N, 2), of all labels and of each source."""
     correct = (answers == tested.labels[:, None]).mean(axis=2)
     sources = np.array([LABELS[label].source for label in tested.labels])
@@ -177,7 +173,7 @@ def _accuracies(answers: Labels, tested: Samples) -> dict[str, Estimate]:
     }
 
 
-def confusion_matrix(answers: Labels, truth: Labels, labels: Labels) -> Array:
+def confusion_matrix(answers: Integers, truth: Integers, labels: Integers) -> Array:
     """Returns a confusion matrix (L, L); rows are true labels and sum to 1.
 
     Args:

@@ -27,8 +27,8 @@ from operator import itemgetter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.parallel import map_in_workers
 from loco_drake.datasets.segments import Segment
 from loco_drake.evaluation.motion_scores import median
@@ -45,8 +45,6 @@ from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.quality import stance_slip_speeds, toe_trajectories
 from loco_drake.retargeting.retarget import RetargetReport, SegmentRetargeter
 from loco_drake.retargeting.scaling import AS_RECORDED, Variant
-
-Array = NDArray[np.float64]
 
 # The animal decides whether there are enough strides: a robot's motion can end a frame
 # before its clip, and a slower robot makes fewer strides.

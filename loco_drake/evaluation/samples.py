@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array, Bools, Integers
 from loco_drake.generation.features import (
     CONTACTS,
     JOINTS,
@@ -33,8 +34,6 @@ from loco_drake.generation.features import (
 from loco_drake.models.robots import Robot
 from loco_drake.motion.motion import FPS, Motion
 from loco_drake.retargeting.trajectories import trajectories
-
-Array = NDArray[np.float64]
 
 SECONDS = 2.0  # the paper's length of a trajectory
 FRAMES = round(SECONDS * FPS)
@@ -63,7 +62,7 @@ class Samples:
 
     channels: Array  # shape (N, 2, FRAMES, CHANNELS); mirror images come second
     summaries: Array  # shape (N, 2, SUMMARY_SIZE)
-    labels: NDArray[np.int64]  # index into gaits.LABELS, shape (N,)
+    labels: Integers  # index into gaits.LABELS, shape (N,)
     # Who or what was recorded, see subject_of, shape (N,); trajectories of one subject
     # are not independent.
     subjects: NDArray[np.str_]
@@ -71,7 +70,7 @@ class Samples:
     def __len__(self) -> int:
         return len(self.labels)
 
-    def __getitem__(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> "Samples":
+    def __getitem__(self, index: Integers | Bools) -> "Samples":
         """Returns those that a mask or indices choose."""
         return Samples(*(column[index] for column in vars(self).values()))
 
@@ -150,7 +149,7 @@ def summarize(channels: Array) -> Array:
     return rounded
 
 
-def label_weights(labels: NDArray[np.int64]) -> Array:
+def label_weights(labels: Integers) -> Array:
     """Returns a weight for each sample, shape (N,), summing to 1.
 
     All labels weigh the same, however many samples each has; so do the samples of a

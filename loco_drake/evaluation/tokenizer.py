@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Integers
 from loco_drake.common.determinism import single_thread
 from loco_drake.evaluation.recorded import Recorded
 from loco_drake.evaluation.samples import subject_of
@@ -35,7 +35,7 @@ NO_RECORDINGS = "No recording of this label is held out."
 
 def evaluate_tokenizer(
     tokenizer: Tokenizer, recorded: Recorded, codebooks: int | None = None
-) -> tuple[dict[str, Any], NDArray[np.int64]]:
+) -> tuple[dict[str, Any], Integers]:
     """Returns the figures, and how often each code of each codebook is used.
 
     Args:

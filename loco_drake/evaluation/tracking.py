@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Context, DiagramBuilder, EventStatus
 from pydrake.systems.primitives import LogVectorOutput
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import (
     quat_error,
     quat_multiply,
@@ -41,8 +41,6 @@ from loco_drake.motion.quality import stance_slip_speeds
 from loco_drake.systems.diagram import AddLocomotion
 from loco_drake.systems.scenario import Scenario
 from loco_drake.systems.simulator import MakeSimulator, StartEpisode
-
-Array = NDArray[np.float64]
 
 # Base errors are re-aligned with the plan this often: they then tell how well the robot
 # moves, not how far a small error of heading carries it off in the end.
@@ -252,7 +250,7 @@ def dress(meshcat: Meshcat) -> None:
     meshcat.SetCameraPose([1.5, -2.5, 1.0], [1.0, 0.0, 0.3])
 
 
-def frame(meshcat: Meshcat, p_WB: NDArray[np.float64]) -> None:
+def frame(meshcat: Meshcat, p_WB: Array) -> None:
     """Moves the camera to show all of the base's path, shape (N, 3)."""
     middle = (p_WB.min(axis=0) + p_WB.max(axis=0)) / 2
     along = p_WB[-1, :2] - p_WB[0, :2]

@@ -23,8 +23,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.common.parallel import map_in_workers
 from loco_drake.control.plan import PLAN_DT, plan_from_motion
@@ -69,7 +69,7 @@ class Episode:
 
     trial: Trial
     figures: dict[str, float]  # of the episode, by name
-    slip: NDArray[np.float64]  # speeds of the toes in stance, m/s, shape (M,)
+    slip: Array  # speeds of the toes in stance, m/s, shape (M,)
     samples: int  # how many were simulated
     fell: bool  # whether the robot did
     wall: float  # seconds spent inside AdvanceTo
@@ -178,7 +178,7 @@ def summarize(episodes: Sequence[Episode]) -> dict[str, Any]:
 def figures(episodes: Sequence[Episode]) -> dict[str, Any]:
     """Returns the aggregated figures of at least one episode."""
 
-    def values(name: str) -> NDArray[np.float64]:
+    def values(name: str) -> Array:
         return np.array([episode.figures[name] for episode in episodes])
 
     samples = np.array([episode.samples for episode in episodes])

@@ -14,6 +14,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
+from loco_drake.common.arrays import Array
 from loco_drake.evaluation.classifier import linear_classifier
 from loco_drake.evaluation.confidence import Estimate, accuracy
 from loco_drake.evaluation.samples import (
@@ -22,8 +23,6 @@ from loco_drake.evaluation.samples import (
     count_per_label,
     join,
 )
-
-Array = NDArray[np.float64]
 
 FOLDS = 5
 # The kernel, of radial basis functions, finds nonlinear differences.

@@ -10,8 +10,8 @@ from typing import Any, ParamSpec
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array
 from loco_drake.evaluation.generation_pictures import (
     CONFUSIONS,
     draw_confusions,
@@ -23,8 +23,6 @@ from loco_drake.evaluation.report.tables import robot_title
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS, SOURCES
 from loco_drake.motion.motion import Motion
-
-Array = NDArray[np.float64]
 
 # Readable on white and on near-black, and by the colour-blind.
 COLORS = dict(zip(SOURCES, ("#d9730d", "#2e86c9", "#1f9d6b", "#b5569b"), strict=True))

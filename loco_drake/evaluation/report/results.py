@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import figures_sha256, read_json
 from loco_drake.evaluation.report.content import CONTENT
@@ -143,7 +143,7 @@ class Figures:
             raise self.damaged(f"{key} is {value!r}, not a string")
         return value or ""
 
-    def matrix(self, key: str, size: int) -> NDArray[np.float64]:
+    def matrix(self, key: str, size: int) -> Array:
         """Returns the square matrix that is called ``key``, shape (size, size)."""
         try:
             values = np.array(self.values.get(key), float)
