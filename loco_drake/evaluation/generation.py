@@ -30,6 +30,7 @@ from loco_drake.evaluation.samples import (
     cut,
     join,
     label_weights,
+    labels_of,
     make_samples,
 )
 from loco_drake.evaluation.two_sample import FOLDS, two_sample_accuracy
@@ -68,7 +69,7 @@ def score_generation(
     Raises:
         InputError: if there are fewer than two such labels.
     """
-    names = set(recorded.labels) & {str(m.label) for m in generated.sets[0]}
+    names = labels_of(recorded.labels, by_label(generated.sets[0]))
     if len(names) < 2:
         raise InputError(
             "To tell gaits apart takes two labels at least, with recordings for "
@@ -239,7 +240,7 @@ def _by_label(robot: Robot, recorded: Recorded, generated: Generated) -> dict[st
         stretches = recorded.of(name)
         real = measure(robot, cut(stretches) or stretches) if stretches else None
         figures[name] = compare(own, real)
-    known = {name: figures[name] for name in map(str, LABELS) if name in figures}
+    known = {name: figures[name] for name in labels_of(figures)}
     return {
         "labels": known,
         "all": overall(known, [measured[name] for name in known]),

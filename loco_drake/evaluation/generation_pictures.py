@@ -16,7 +16,7 @@ from loco_drake.common.rotations import (
 )
 from loco_drake.evaluation.recognition import Recognition
 from loco_drake.evaluation.recorded import Recorded
-from loco_drake.evaluation.samples import by_label
+from loco_drake.evaluation.samples import by_label, labels_of
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import Motion
@@ -112,7 +112,7 @@ def motion_figure(
     legs in front; the first motion of each label is shown.
     """
     sides = {"recorded": by_label(recorded), "generated": by_label(generated)}
-    names = [k for k in map(str, LABELS) if all(k in side for side in sides.values())]
+    names = labels_of(*sides.values())
     figure = Figure(figsize=(14, 1.3 * len(names)), layout="constrained")
     axes = figure.subplots(len(names), 2, squeeze=False)
     for row, name in zip(axes, names, strict=True):

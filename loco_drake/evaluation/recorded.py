@@ -9,7 +9,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.common.parallel import map_in_workers
 from loco_drake.datasets.segments import read_segments, select_labels
 from loco_drake.datasets.split import VALIDATION, Split
-from loco_drake.evaluation.samples import FRAMES
+from loco_drake.evaluation.samples import by_label, cut, labels_of
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import FPS, Motion
@@ -28,17 +28,12 @@ class Recorded:
 
     def of(self, label: str) -> list[Motion]:
         """Returns all stretches of a label, of both sides."""
-        both = (*self.train, *self.validation)
-        return [motion for motion in both if str(motion.label) == label]
+        return by_label((*self.train, *self.validation)).get(label, [])
 
     @property
     def labels(self) -> tuple[str, ...]:
         """Labels that both sides have a trajectory of, in the order of LABELS."""
-        sides = [
-            {str(m.label) for m in side if len(m) >= FRAMES}
-            for side in (self.train, self.validation)
-        ]
-        return tuple(str(k) for k in LABELS if all(str(k) in side for side in sides))
+        return labels_of(*map(by_label, map(cut, (self.train, self.validation))))
 
 
 def retarget_recordings(

@@ -32,6 +32,7 @@ from loco_drake.common.arrays import Array
 from loco_drake.common.parallel import map_in_workers
 from loco_drake.datasets.segments import Segment
 from loco_drake.evaluation.motion_scores import median
+from loco_drake.evaluation.samples import labels_of
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.models.robot_files import load_robot
 from loco_drake.motion.gait_timing import (
@@ -41,7 +42,6 @@ from loco_drake.motion.gait_timing import (
     gait_timing,
     motion_track,
 )
-from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.quality import stance_slip_speeds, toe_trajectories
 from loco_drake.retargeting.retarget import RetargetReport, SegmentRetargeter
 from loco_drake.retargeting.scaling import AS_RECORDED, Variant
@@ -157,7 +157,6 @@ def summarize(scores: Sequence[ClipScore | FailedClip]) -> dict[str, Any]:
     among the fifteen, which "all" leaves out; "warnings" has sentences by clip, see
     :mod:`loco_drake.retargeting.bounds`.
     """
-    names = [str(label) for label in LABELS]
     by_label: dict[str, list[ClipScore]] = {}
     for score in scores:
         clips = by_label.setdefault(score.segment.label, [])
@@ -165,11 +164,12 @@ def summarize(scores: Sequence[ClipScore | FailedClip]) -> dict[str, Any]:
             clips.append(score)
     failed = [score for score in scores if isinstance(score, FailedClip)]
     done = [clip for clips in by_label.values() for clip in clips]
+    names = labels_of(by_label)
     known = [clip for clip in done if clip.segment.label in names]
     frames = sum(clip.report.frames for clip in done)
     seconds = sum(clip.report.frames / clip.report.frames_per_second for clip in done)
     return {
-        "labels": {name: figures(by_label[name]) for name in names if name in by_label},
+        "labels": {name: figures(by_label[name]) for name in names},
         "all": figures(known),
         "frames_per_second": frames / seconds if done else None,
         "warnings": {

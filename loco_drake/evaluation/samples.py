@@ -17,7 +17,7 @@ mirror image left and right are chance in recordings, and generators are trained
 """
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +32,7 @@ from loco_drake.generation.features import (
     motion_features,
 )
 from loco_drake.models.robots import Robot
+from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import FPS, Motion
 from loco_drake.retargeting.trajectories import trajectories
 
@@ -111,6 +112,11 @@ def subject_of(motion: Motion) -> str | None:
 def cut(motions: Iterable[Motion]) -> list[Motion]:
     """Returns all trajectories of motions, in their order."""
     return [part for motion in motions for part in trajectories(motion)]
+
+
+def labels_of(*sides: Container[str]) -> tuple[str, ...]:
+    """Returns those of the fifteen labels that all sides have, in order."""
+    return tuple(k for k in map(str, LABELS) if all(k in side for side in sides))
 
 
 def by_label(motions: Iterable[Motion]) -> dict[str, list[Motion]]:
