@@ -49,12 +49,11 @@ def accuracy(
     trials.
 
     Args:
-        correct: share of a trajectory that was classified rightly in a run, in [0, 1],
+        correct: share of each trajectory classified correctly in each run, in [0, 1],
             shape (runs, N).
-        weights: of the trajectories, shape (N,).
-        groups: trajectories of one group, such as a recording, are drawn together,
-            shape (N,).
-        seed: of the bootstrap.
+        weights: weight of each trajectory, shape (N,).
+        groups: group of each trajectory, such as its recording, shape (N,).
+        seed: seed of the bootstrap.
     """
     weights = weights / weights.sum()
     mean = float(np.mean(correct @ weights))

@@ -30,10 +30,8 @@ OVERLAP = 1.0  # s
 def moments(features: Array, weights: Array) -> tuple[Array, Array]:
     """Returns weighted mean (C,) and covariance (C, C) of features (N, ..., C).
 
-    Args:
-        features: the vectors of a row, such as those of a trajectory and its mirror
-            image, share the row's weight.
-        weights: shape (N,).
+    Vectors of one row, such as those of a trajectory and its mirror image, share its
+    weight; weights have the shape (N,).
     """
     sides = int(np.prod(features.shape[1:-1]))
     flat = features.reshape(-1, features.shape[-1])
@@ -44,15 +42,11 @@ def moments(features: Array, weights: Array) -> tuple[Array, Array]:
 
 
 def frechet_distance(a: tuple[Array, Array], b: tuple[Array, Array]) -> float:
-    """Returns ``|m_a - m_b|^2 + tr(C_a + C_b - 2 (C_a C_b)^(1/2))``.
+    """Returns ``|m_a - m_b|^2 + tr(C_a + C_b - 2 (C_a C_b)^(1/2))``, see moments.
 
     EPSILON is added to the diagonals of both covariances, so that singular ones do no
     harm. The trace of the root is the sum of the roots of the eigenvalues of
     ``C_a^(1/2) C_b C_a^(1/2)``, which is symmetric.
-
-    Args:
-        a: mean (C,) and covariance (C, C).
-        b: the same of the other.
     """
     (mean_a, cov_a), (mean_b, cov_b) = a, b
     floor = EPSILON * np.eye(len(mean_a))
@@ -69,11 +63,8 @@ def frechet_distance(a: tuple[Array, Array], b: tuple[Array, Array]) -> float:
 def shifted_distances(trajectories: Array, stretch: Array) -> Array:
     """Returns the least joint RMS over all shifts, rad, shape (N,).
 
-    Infinity if the stretch is too short to overlap.
-
-    Args:
-        trajectories: joint angles, shape (N, T, 12).
-        stretch: joint angles, shape (L, 12).
+    Trajectories (N, T, 12) and stretch (L, 12) are joint angles in rad. The distance is
+    infinite if the stretch is too short to overlap.
     """
     frames, length = trajectories.shape[1], len(stretch)
     needed = round(OVERLAP * FPS)
@@ -106,16 +97,10 @@ def nearest_distances(
 ) -> Array:
     """Returns each trajectory's distance to the nearest stretch of its label.
 
-    Stretches count as they are and mirrored.
-
-    Args:
-        trajectories: all of one length.
-        stretches: recorded motion.
-        other_subjects: whether stretches of the trajectory's own subject are left out,
-            as they must be where a trajectory was cut from one.
-
-    Returns:
-        rad, shape (N,); infinity where there is no stretch to compare with.
+    All trajectories have one length. Stretches count as they are and mirrored; with
+    ``other_subjects`` those of a trajectory's own subject are left out, as they must be
+    if it was cut from one. Distances are in rad, shape (N,), and infinite without a
+    stretch to compare with.
     """
     joints = np.stack([motion.joint_positions for motion in trajectories])
     labels = np.array([str(motion.label) for motion in trajectories])

@@ -51,15 +51,11 @@ RESOLUTION = {
 def drift(robot: Robot, motions: Sequence[Motion]) -> dict[str, Any]:
     """Returns the drift of each figure, of motions of one gait; see above.
 
-    Args:
-        robot: robot of the motions.
-        motions: two or more motions of different seeds, longer than 2 WINDOW.
-
-    Returns:
-        For each figure its means in the first and last WINDOW seconds, the share of
-        motions that lost it, change, tolerance, and drift. A figure that fewer than
-        two motions have in their first window, such as a stride period of robots that
-        stand, is left out.
+    Two or more motions of different seeds are longer than 2 WINDOW. The result has, for
+    each figure, its means in the first and last WINDOW seconds, the share of motions
+    that lost it, change, tolerance, and drift. A figure that fewer than two motions
+    have in their first window, such as a stride period of robots that stand, is left
+    out.
     """
     first, last = (
         _table(robot, side)
@@ -90,14 +86,9 @@ def beyond_recorded(
 ) -> dict[str, float]:
     """Returns change of heading and height against those of recordings; see above.
 
-    Args:
-        motions: of one gait, longer than 2 WINDOW.
-        recorded: whole stretches of that gait, at least one of which is 2 s long.
-
-    Returns:
-        ``turn_2s_rad`` and ``recorded_turn_2s_rad``; ``turn_over_recorded``;
-        ``height_over_recorded``. The ratios are 1 or less if there is no more of it
-        than in recordings.
+    Motions are of one gait and longer than 2 WINDOW. At least one of the recorded
+    stretches is 2 s long. The ratios, ``turn_over_recorded`` and
+    ``height_over_recorded``, are at most 1 if motions change no more than recordings.
     """
     begins, ends = zip(*(_ends(motion) for motion in motions), strict=True)
     cuts = cut(recorded)

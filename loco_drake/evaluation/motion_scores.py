@@ -112,9 +112,8 @@ def overall(
 ) -> dict[str, Any]:
     """Returns the figures of all labels together.
 
-    Args:
-        labels: figures of each, from :func:`compare`.
-        measured: of the generated motion, label by label.
+    They are made of those of each label, from :func:`compare`, and of what its
+    generated motion measures.
     """
     slips = np.concatenate([np.empty(0), *(m.slip_speeds for m in measured)])
 

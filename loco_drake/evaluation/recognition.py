@@ -176,10 +176,8 @@ def _accuracies(answers: Integers, tested: Samples) -> dict[str, Estimate]:
 def confusion_matrix(answers: Integers, truth: Integers, labels: Integers) -> Array:
     """Returns a confusion matrix (L, L); rows are true labels and sum to 1.
 
-    Args:
-        answers: indices into LABELS, shape (runs, N, 2).
-        truth: the same, shape (N,).
-        labels: labels of rows and columns, shape (L,).
+    Answers (runs, N, 2), truth (N,) and the labels of rows and columns (L,) are indices
+    into LABELS.
     """
     true = np.broadcast_to(truth[:, None], answers.shape)
     return metrics.confusion_matrix(

@@ -38,15 +38,10 @@ def evaluate_tokenizer(
 ) -> tuple[dict[str, Any], Integers]:
     """Returns the figures, and how often each code of each codebook is used.
 
-    Args:
-        tokenizer: tokenizer that knows the recordings' robot.
-        recorded: whole stretches.
-        codebooks: number of codebooks to decode from, the coarsest first; None: all.
-
-    Returns:
-        "labels" and "all" of recordings held out, the same under "train",
-        "codebook_use" and "books", the share that is used of each; the counts have
-        shape (codebooks, codebook_size).
+    The figures are "labels" and "all" of recordings held out, the same under "train",
+    "codebook_use" and "books", the share that is used of each. The counts have the
+    shape (codebooks, codebook_size). ``codebooks`` is the number to decode from, the
+    coarsest first; None: all.
     """
     sides = recorded.train, recorded.validation
     train, held_out = ([motion_clip(motion) for motion in side] for side in sides)
@@ -89,11 +84,8 @@ def transfer_rmse(
 ) -> float:
     """Returns the RMS joint error of transferred motion over all pairs, rad.
 
-    Args:
-        tokenizer: knows both robots.
-        pairs: motion to encode, and what it is to become on the other robot; both of
-            the same stretch of a recording. Frames beyond the last whole token are
-            left out.
+    A pair is the motion to encode and what it is to become on the other robot, both of
+    the same stretch of a recording. Frames beyond the last whole token are left out.
     """
     squares = []
     for given, wanted in pairs:

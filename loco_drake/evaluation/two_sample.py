@@ -37,15 +37,9 @@ def two_sample_accuracy(
 ) -> Estimate | None:
     """Returns the accuracy of distinguishing trajectories of ``a`` and ``b``.
 
-    Args:
-        a: one set, such as real trajectories.
-        b: the other set.
-        seeds: each draws trajectories and folds anew; the accuracy is the mean.
-        classifier: classifier of the summaries, a key of CLASSIFIERS.
-
-    Returns:
-        Accuracy and interval, see :func:`loco_drake.evaluation.confidence.accuracy`;
-        None if there are fewer than FOLDS subjects in either set.
+    It is the mean over seeds, each of which draws trajectories and folds anew, with the
+    interval of :func:`.confidence.accuracy`; None if either set has fewer than FOLDS
+    subjects. ``classifier`` is a key of CLASSIFIERS.
     """
     counts = count_per_label(a) & count_per_label(b)
     estimates = []

@@ -91,10 +91,8 @@ def figure_cell(found: Measured | None, digits: int = 3, reason: str = "") -> Ce
 def column_cell(column: Column, figures: Figures, otherwise: str = "") -> Cell:
     """Returns the entry that figures make in a column.
 
-    Args:
-        column: its key may lead to the mean of an estimate, which has an interval.
-        figures: those of a row.
-        otherwise: why there is nothing, if figures do not say so.
+    The key may lead to the mean of an estimate, which has an interval. ``otherwise``
+    says why there is nothing, if the figures do not.
     """
     *path, last = column.key.split(".")
     part = figures
