@@ -204,11 +204,5 @@ def take_picture(meshcat: Meshcat, png: Path, size: tuple[int, int]) -> None:
 
 
 if __name__ == "__main__":
-    tyro.extras.subcommand_cli_from_dict(
-        {
-            "robot": robot,
-            "retargeting": retargeting,
-            "gait-change": gait_change,
-            "library": library,
-        }
-    )
+    pictures = {"robot": robot, "retargeting": retargeting, "library": library}
+    tyro.extras.subcommand_cli_from_dict({**pictures, "gait-change": gait_change})

@@ -42,7 +42,7 @@ def moments(features: Array, weights: Array) -> tuple[Array, Array]:
 
 
 def frechet_distance(a: tuple[Array, Array], b: tuple[Array, Array]) -> float:
-    """Returns ``|m_a - m_b|^2 + tr(C_a + C_b - 2 (C_a C_b)^(1/2))``, see moments.
+    """Returns ``|m_a - m_b|^2 + tr(C_a + C_b - 2 (C_a C_b)^(1/2))`` of two moments.
 
     EPSILON is added to the diagonals of both covariances, so that singular ones do no
     harm. The trace of the root is the sum of the roots of the eigenvalues of
