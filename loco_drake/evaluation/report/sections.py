@@ -160,18 +160,17 @@ def _worst(figures: Figures) -> Cell:
 
 def conditions_text(figures: Figures) -> str:
     """Returns under which conditions tracking was measured."""
-    episodes = figures.part("all").number("episodes")
-    duration, step = figures.number("duration_s"), figures.number("time_step_s")
-    friction = figures.number("friction")
-    first = (
-        "" if episodes is None else f"{episodes:.0f} episodes",
-        "" if duration is None else f"of up to {duration:g} s",
-    )
+
+    def shown(text: str, value: float | None, factor: float = 1.0) -> str:
+        return "" if value is None else text.format(factor * value)
+
+    episodes = shown("{:.0f} episodes", figures.part("all").number("episodes"))
+    duration = shown("of up to {:g} s", figures.number("duration_s"))
     parts = (
-        " ".join(filter(None, first)),
+        f"{episodes} {duration}".strip(),
         figures.text("contact"),
-        "" if step is None else f"{1000 * step:g} ms",
-        "" if friction is None else f"friction {friction:g}",
+        shown("{:g} ms", figures.number("time_step_s"), 1000),
+        shown("friction {:g}", figures.number("friction")),
     )
     return f"{', '.join(filter(None, parts))}."
 
