@@ -53,6 +53,9 @@ class Robot(Quadruped):
     abduction_offset: Array
     thigh_length: float  # thigh joint to calf joint, m
     calf_length: float  # calf joint to the centre of the toe sphere, m
+    # What all joints can lose at once while the mass matrix stays positive definite in
+    # every pose, also with parameters.LEAST_PAYLOAD, kg m^2.
+    removable_inertia: float
     trunk_size: Array  # of the trunk's collision box, centred at B, in m, shape (3,)
 
     @property
@@ -197,7 +200,7 @@ def get_robot(name: str) -> Robot:
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.01)
     AddRobotModel(Parser(plant), name, visual=False)
     plant.Finalize()
-    # The URDF lacks the standing pose: rad, legs FL, FR, RL, RR.
+    # The URDF lacks the standing pose, in rad, and the removable inertia.
     extras = yaml_load(filename=str(_MODELS / name / f"{name}.yaml"))
     names = tuple(f"{leg}_{part}_joint" for leg in LEGS for part in LEG_JOINTS)
     joints = [plant.GetJointByName(joint) for joint in names]
@@ -233,6 +236,7 @@ def get_robot(name: str) -> Robot:
         joint_inertia=joint_inertia.copy(),
         kp=np.array([gain.p for gain in gains]),
         kd=np.array([gain.d for gain in gains]),
+        removable_inertia=extras["removable_inertia"],
         mass=float(plant.CalcTotalMass(context)),
         p_BHip=p_BHip,
         abduction_offset=p_BThigh[:, 1] - p_BHip[:, 1],

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
+from scipy.optimize import minimize
 
 from loco_drake.common.errors import InputError
 from loco_drake.models.parameters import (
+    LEAST_PAYLOAD,
     SetReflectedInertia,
     SetTrunkLoad,
     check_strength,
@@ -42,6 +44,36 @@ def share_of_indefinite_poses(name, strength, payload=0.0):
         plant.SetPositions(context, [1.0, *[0.0] * 6, *joints])
         lowest.append(np.linalg.eigvalsh(plant.CalcMassMatrix(context))[0])
     return np.mean(np.array(lowest) <= 0)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_removable_inertia_is_the_least_of_all_poses(name):
+    """Searched from many poses within the joint limits, the trunk at its lightest.
+
+    With S to select the joints' columns of the mass matrix M, M - c S S' is positive
+    definite while c is below the smallest eigenvalue of (S' M^-1 S)^-1.
+    """
+    robot = get_robot(name)
+    plant = MultibodyPlant(0.0)
+    robot.AddModel(Parser(plant))
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    trunk = plant.GetBodyByName("base")
+    SetTrunkLoad(trunk, context, mass=LEAST_PAYLOAD, p_shift_B=np.zeros(3))
+
+    def removable(joints):
+        plant.SetPositions(context, [1.0, *[0.0] * 6, *joints])
+        M = plant.CalcMassMatrix(context)
+        return 1 / np.linalg.eigvalsh(np.linalg.inv(M)[6:, 6:])[-1]
+
+    limits = robot.joint_lower, robot.joint_upper
+    poses = np.random.default_rng(0).uniform(*limits, (1000, 12))
+    bounds = list(zip(*limits, strict=True))
+    worst = sorted(poses, key=removable)[:4]
+    found = [
+        minimize(removable, q, bounds=bounds, method="L-BFGS-B").fun for q in worst
+    ]
+    assert robot.removable_inertia == int(1e4 * min(found)) / 1e4
 
 
 @pytest.mark.parametrize(("name", "least"), [("go2", 0.79), ("a1", 0.64)])
