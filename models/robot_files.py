@@ -26,7 +26,7 @@ from .chains import ChainRobot
 from .legs import LEGS
 from .quadruped import Quadruped
 from .robots import ROBOTS, get_robot
-from .urdf import UrdfLegs, find_urdf, read_legs
+from .urdf import LIMITS, LegFile, find_urdf, read_legs
 
 SUFFIXES = (".yaml", ".yml")
 
@@ -37,23 +37,6 @@ _MAX_FOOT = 0.4
 # An axis is where it should be if it is off by less than 45 degrees.
 _ALONG = np.sqrt(0.5)
 _MAX_TURN = 20.0  # rad; more must be degrees
-_LIMITS = ("lower", "upper", "speed")
-
-
-@dataclass(kw_only=True)
-class LegFile:
-    """One leg of a robot."""
-
-    # Names of its joints, from the trunk to the toe; all of them revolute.
-    joints: list[str] = field(default_factory=list)
-    # The link, or frame, at the centre of the sphere that touches the ground.
-    foot: str = ""
-    # The joints in the usual stance, rad.
-    stand: list[float] = field(default_factory=list)
-    # Limits, where those of the URDF do not suit: rad, rad and rad/s.
-    lower: list[float] = field(default_factory=list)
-    upper: list[float] = field(default_factory=list)
-    speed: list[float] = field(default_factory=list)
 
 
 @dataclass(kw_only=True)
@@ -135,7 +118,7 @@ def _check(file: RobotFile) -> None:
                 f"All legs must have as many joints, but {LEGS[0]} has {count} and "
                 f"{name} {len(leg.joints)}."
             )
-        for key in ("stand", *_LIMITS):
+        for key in ("stand", *LIMITS):
             values = getattr(leg, key)
             if values and (len(values) != count or not np.isfinite(values).all()):
                 raise InputError(
@@ -159,15 +142,8 @@ def _make(file: RobotFile, path: Path) -> ChainRobot:
             f"The name {name[:80]!r} must be letters, digits, _, - and ., at most 64; "
             "give another as its name."
         )
-    stand = np.array([angle for leg in legs for angle in leg.stand])
-    urdf = read_legs(
-        find_urdf(file.urdf, path.parent),
-        file.trunk,
-        [leg.joints for leg in legs],
-        [leg.foot for leg in legs],
-        stand,
-    )
-    lower, upper, speed = (_limits(legs, key, urdf) for key in _LIMITS)
+    urdf = read_legs(find_urdf(file.urdf, path.parent), file.trunk, legs)
+    stand, lower, upper = urdf.stand, urdf.lower, urdf.upper
     joint_names = tuple(joint for leg in legs for joint in leg.joints)
     for joint, low, angle, high in zip(joint_names, lower, stand, upper, strict=True):
         if not low <= angle <= high:
@@ -175,7 +151,7 @@ def _make(file: RobotFile, path: Path) -> ChainRobot:
                 f"In the stance {joint} at {angle:g} rad is not within {low:g} to "
                 f"{high:g}."
             )
-    for joint, limit in zip(joint_names, speed, strict=True):
+    for joint, limit in zip(joint_names, urdf.speed, strict=True):
         if limit == 0:
             raise InputError(
                 f"The URDF lets joint {joint} move at 0 rad/s; give its leg's speed."
@@ -186,7 +162,7 @@ def _make(file: RobotFile, path: Path) -> ChainRobot:
         joint_names=joint_names,
         joint_lower=lower,
         joint_upper=upper,
-        joint_speed_limits=speed,
+        joint_speed_limits=urdf.speed,
         p_BHip=urdf.origins[:, 0].copy(),
         foot_radius=file.foot_radius,
         stand_joints=stand,
@@ -269,10 +245,3 @@ def _axis(direction: Array) -> str:
     """Returns the axis that a direction is nearest to, such as "-x"."""
     k = int(np.abs(direction).argmax())
     return f"{'-' if direction[k] < 0 else '+'}{'xyz'[k]}"
-
-
-def _limits(legs: list[LegFile], key: str, urdf: UrdfLegs) -> Array:
-    """Returns the limits of all joints: those of the file, else of the URDF."""
-    defaults = getattr(urdf, key).reshape(4, -1)
-    rows = [getattr(leg, key) or own for leg, own in zip(legs, defaults, strict=True)]
-    return np.concatenate(rows).astype(np.float64)

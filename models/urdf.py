@@ -3,6 +3,7 @@
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,6 +24,8 @@ _MAX_LENGTH = 1e5  # in the unit of the file; whether it is m is asked later
 # A link beyond the foot, such as a sensor's, reaches at most this share further.
 _FOOT_SHARE = 0.1
 
+LIMITS = ("lower", "upper", "speed")
+
 # What is left of a URDF: what moves, and how. So it needs no inertias and no meshes.
 _KEPT = {
     "robot": {"link", "joint", "frame"},
@@ -34,6 +37,22 @@ _KEPT = {
 _WORLD, _NOT_WORLD = "world", "world_link"
 
 
+@dataclass(kw_only=True)
+class LegFile:
+    """One leg of a robot."""
+
+    # Names of its joints, from the trunk to the toe; all of them revolute.
+    joints: list[str] = field(default_factory=list)
+    # The link, or frame, at the centre of the sphere that touches the ground.
+    foot: str = ""
+    # The joints in the usual stance, rad.
+    stand: list[float] = field(default_factory=list)
+    # Limits, where those of the URDF do not suit: rad, rad and rad/s.
+    lower: list[float] = field(default_factory=list)
+    upper: list[float] = field(default_factory=list)
+    speed: list[float] = field(default_factory=list)
+
+
 class UrdfLegs(NamedTuple):
     """Four legs of n joints each, their frames where all joints are at zero."""
 
@@ -42,9 +61,12 @@ class UrdfLegs(NamedTuple):
     axes: Array  # unit vectors along the joints' axes in B, shape (4, n, 3)
     origins: Array  # of the joints in B, m, shape (4, n, 3)
     toes: Array  # origins of the foot frames in B, m, shape (4, 3)
-    lower: Array  # position limits, rad, shape (4 n,)
-    upper: Array  # position limits, rad, shape (4 n,)
-    speed: Array  # limits, rad/s, shape (4 n,)
+    stand: Array  # joints of the usual stance, rad, shape (4 n,)
+    # Limits of position and speed: the robot file's, else the URDF's; rad and rad/s,
+    # shape (4 n,).
+    lower: Array
+    upper: Array
+    speed: Array
 
 
 def find_urdf(url: str, folder: Path) -> Path:
@@ -70,28 +92,25 @@ def find_urdf(url: str, folder: Path) -> Path:
     return found
 
 
-def read_legs(
-    path: Path,
-    trunk: str,
-    joints: Sequence[Sequence[str]],
-    feet: Sequence[str],
-    stand: Array,
-) -> UrdfLegs:
-    """Returns the legs in a URDF, by names of the frame B, joints and toes' frames.
+def read_legs(path: Path, trunk: str, legs: Sequence[LegFile]) -> UrdfLegs:
+    """Returns the legs FL, FR, RL, RR in a URDF; ``trunk`` is the name of frame B.
 
-    Those of ``joints``, of each leg from the trunk to the toe, are at ``stand`` in the
-    usual stance, rad, shape (4 n,); all others stay at zero.
+    Joints that are not the legs' stay at zero.
 
     Raises:
         InputError: naming what is missing or impossible.
     """
-    names = [name for leg in joints for name in leg]
+    names = [name for leg in legs for name in leg.joints]
+    feet = [leg.foot for leg in legs]
     root = _read_xml(path)
     elements = {str(joint.get("name")): joint for joint in root.iterfind("joint")}
-    limits = [
-        _read_limits(elements[check_choice("joint", name, elements)]) for name in names
-    ]
-    lower, upper, speed = np.array(limits).T
+    limits = np.array(
+        [_read_limits(elements[check_choice("joint", n, elements)]) for n in names]
+    )
+    for leg, of_leg in zip(legs, limits.reshape(4, -1, len(LIMITS)), strict=True):
+        for k, key in enumerate(LIMITS):
+            of_leg[:, k] = getattr(leg, key) or of_leg[:, k]
+    lower, upper, speed = limits.T.copy()
     above = [_joints_above(root, foot) for foot in feet]
     model = _strip(root, names)
     plant = MultibodyPlant(time_step=0.0)
@@ -109,13 +128,13 @@ def read_legs(
     check_choice("trunk", trunk, frames)
     for foot in feet:
         check_choice("foot", foot, frames)
-    for leg, foot, own, found in zip(LEGS, feet, joints, above, strict=True):
-        moved_by = [name for name in found if name in names]
-        if moved_by != list(own):
+    for name, leg, found in zip(LEGS, legs, above, strict=True):
+        moved_by = [joint for joint in found if joint in names]
+        if moved_by != leg.joints:
             raise InputError(
-                f"Foot {foot} of leg {leg} is moved by the joints "
+                f"Foot {leg.foot} of leg {name} is moved by the joints "
                 f"{', '.join(moved_by) or '(none)'}, in this order, "
-                f"not by {', '.join(own)}."
+                f"not by {', '.join(leg.joints)}."
             )
     context = plant.CreateDefaultContext()
     base = plant.GetFrameByName(trunk)
@@ -128,15 +147,17 @@ def read_legs(
     toes = [plant.GetFrameByName(f).CalcPose(context, base).translation() for f in feet]
     if not (np.abs([*origins, *toes]) < _MAX_LENGTH).all():
         raise InputError(f"{path.name} has joints more than {_MAX_LENGTH:g} m away.")
+    stand = np.concatenate([leg.stand for leg in legs]).astype(np.float64)
     for joint, angle in zip(moving, stand, strict=True):
         joint.set_angle(context, angle)
-    for foot, own in zip(feet, joints, strict=True):
-        _check_end(plant, context, foot, own[0])
+    for leg in legs:
+        _check_end(plant, context, leg.foot, leg.joints[0])
     return UrdfLegs(
         model=model,
         axes=np.reshape(axes, (4, -1, 3)),
         origins=np.reshape(origins, (4, -1, 3)),
         toes=np.array(toes),
+        stand=stand,
         lower=lower,
         upper=upper,
         speed=speed,
