@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import struct
 import warnings
 import zipfile
@@ -22,8 +23,9 @@ from tests.made_inputs import (
     walking_animal,
 )
 from tests.synthetic_bvh import write_dog_bvh
-from tests.synthetic_horse import make_horse, write_world_recording
+from tests.synthetic_horse import make_horse, write_raw_recording, write_world_recording
 from tests.synthetic_motion import synthetic_motion
+from tests.synthetic_robots import write_mpc_recording, write_solo8_recording
 
 
 @pytest.fixture
@@ -86,28 +88,78 @@ def test_floor_of_a_dog_may_be_anywhere(cli, offset):
     assert moved.base_position == pytest.approx(motion.base_position, abs=2e-3)
 
 
-def test_dog_that_lies_at_first_is_scaled_as_it_stands(cli):
-    """dog_lies_most_of_the_time: 4 s of lying before 3 s of walking."""
-    parts = walking_animal(seconds=3.0)
-    save_dog(Path("walks.txt"), *parts)
-    share = np.linspace(0.0, 1.0, 40)[:, None]
-    low = np.array([0.0, 0.0, -0.34])
+# Of each form of a recording: source, what writes it, the first column of a height, how
+# many columns lie between two, and how many of its units make a metre.
+HORSE = make_horse("trot", 60.0, 4.0)
+FORMS = {
+    "dog.bvh": ("dog", lambda file: write_dog_bvh(file, "trot", 2.0), 1, 10**6, 100),
+    "horse.csv": ("horse", lambda file: write_raw_recording(file, HORSE), 4, 3, 1000),
+    "horse.txt": ("horse", lambda file: write_world_recording(file, HORSE), 2, 3, 1),
+    "mpc.txt": ("mpc", lambda file: write_mpc_recording(file, "trot"), 2, 3, 1),
+    "solo8.txt": ("solo8", write_solo8_recording, 2, 3, 1),
+}
 
-    def lying(points):
-        rise = points[:1] + low * (1 - share)
-        return np.concatenate((np.repeat(points[:1] + low, 200, 0), rise, points))
+
+@pytest.mark.parametrize("offset", [0.2, -0.3, 25.0])
+@pytest.mark.parametrize("form", FORMS)
+def test_floor_of_any_recording_may_be_anywhere(cli, form, offset):
+    """dog_floor_offset: in every form, in the unit of its file."""
+    source, write, first, step, unit = FORMS[form]
+    write(Path(form))
+    separator = " " if form.endswith("bvh") else ","
+    lines = Path(form).read_text().splitlines()
+    for number, line in enumerate(lines):
+        words = line.split(separator)
+        if len(words) > 6 and re.fullmatch(r"[-\d.e]+", words[0]):
+            heights = [float(word) + unit * offset for word in words[first::step]]
+            words[first::step] = map(str, heights)
+            lines[number] = separator.join(words)
+    raised = f"raised{100 * offset:g}-{form}"
+    Path(raised).write_text("\n".join(lines))
+    row, motion, error = retarget(cli, form, source)
+    assert error == ""
+    other, moved, error = retarget(cli, raised, source)
+    (told,) = re.findall(f"{raised}: ground: moved from z = (.*) m to 0", error)
+    assert float(told) == pytest.approx(offset, abs=0.015)  # accuracy of markers
+    assert other["scale"] == pytest.approx(row["scale"], rel=0.01)
+    expected = pytest.approx(motion.base_position, rel=0.01, abs=0.01)
+    assert moved.base_position == expected
+
+
+def lying_dog(frames, when, offset=0.0):
+    """A dog that walks for 3 s, and lies before, amid or after that; points (T, 3)."""
+    parts = walking_animal(seconds=3.0)
+    k = {"first": 0, "between": 90, "last": 179}[when]
+    sink = np.linspace(0.0, 1.0, 40)[:, None] * (0.0, 0.0, -0.34)
+    down = np.repeat(sink[-1:], frames, axis=0)
+    way = {
+        "first": (down, sink[::-1]),
+        "between": (sink, down, sink[::-1]),
+        "last": (sink, down),
+    }[when]
+    path = np.concatenate(way)
+
+    def points(walk, path):
+        lies = walk[k] + path.reshape(-1, *(1,) * (walk.ndim - 2), 3)
+        whole = [walk[:k], lies, walk[k:]] if when != "last" else [walk, lies]
+        return np.concatenate(whole) + np.array([0.0, 0.0, offset])
 
     withers, hip, toes = parts
-    still = np.concatenate((np.repeat(toes[:1], 240, 0), toes))
-    save_dog(Path("lies.txt"), lying(withers), lying(hip), still)
+    return points(withers, path), points(hip, path), points(toes, 0 * path)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1.0])
+@pytest.mark.parametrize("when", ["first", "between", "last"])
+@pytest.mark.parametrize("seconds", [1, 10, 30])
+def test_dog_that_lies_is_scaled_as_it_stands(cli, when, seconds, offset):
+    """dog_lies_most_of_the_time: whenever, however long, wherever the floor is."""
+    save_dog(Path("walks.txt"), *walking_animal(seconds=3.0))
+    file = f"lies-{when}-{seconds}-{offset:g}.txt"
+    save_dog(Path(file), *lying_dog(60 * seconds, when, offset))
     row, motion, _ = retarget(cli, "walks.txt")
-    status, figures, error = cli("retarget --source dog --gait trot", "lies.txt")
-    if status == 2:  # then it says which frames will do
-        assert_refused((status, figures, error), "frame")
-        return
-    (other,) = figures.values()
-    assert other["scale"] == pytest.approx(row["scale"], rel=0.05)
-    lies = load_motion(Path(other["path"]))
+    other, lies, error = retarget(cli, file)
+    assert "frames on its feet" in error
+    assert other["scale"] == pytest.approx(row["scale"], rel=0.01)
     assert lies.base_position[:, 2].max() < motion.base_position[:, 2].max() + 0.02
 
 

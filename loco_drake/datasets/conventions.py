@@ -39,6 +39,9 @@ TURNED = {
 # Markers of standing toes sit this low or high in each recording; the tenth percentile
 # of a toe's height lies well within stance, which is a quarter of a gallop.
 STANCE_PERCENTILE = 10.0
+# Animals that lie or sit may stand for a twentieth of a recording only; then the trunk
+# is above this of its height.
+STANDING, STANDING_PERCENTILE = 0.65, 95.0
 # A ground off by more, in body sizes, is the file's and not the markers'.
 GROUND = 0.045
 # Slope of the ground in degrees, told by toes that stand this far apart, in body sizes.
@@ -173,8 +176,9 @@ def _trunk_length(points: Array) -> float:
 
 def _height(points: Array) -> float:
     """Returns the height in m of the trunk's middle when the animal is on its feet."""
-    trunk = np.percentile(points[:, :2, 2].mean(axis=1), 75)
-    return float(trunk - np.median(_stance_heights(points)))
+    trunk = points[:, :2, 2].mean(axis=1) - np.median(_stance_heights(points))
+    standing = trunk >= STANDING * np.percentile(trunk, STANDING_PERCENTILE)
+    return float(np.percentile(trunk[standing], 75))
 
 
 def _size(points: Array) -> float:
