@@ -23,7 +23,8 @@ _STIFFNESS = 1e9
 # Of the feet, s/m. A contact uses the mean of both, weighted by the other's stiffness.
 _FOOT_DISSIPATION = 1.0
 
-_TILE = 0.5  # m; shows at a glance how far and how fast a robot goes
+TILE = 0.5  # m; shows at a glance how far and how fast a robot goes
+FLOOR_Z = -0.001  # m; a hair below 0, where Meshcat has a grid of its own
 _TILES = 60  # along each side
 _MATERIALS = """
 newmtl light
@@ -52,9 +53,8 @@ def AddGround(plant: MultibodyPlant, *, friction: float, visual: bool) -> None:
         world, RigidTransform(), HalfSpace(), "ground", properties
     )
     if visual:
-        # A hair below z = 0, where Meshcat has a grid of its own.
         floor = GeometryInstance(
-            RigidTransform([0.0, 0.0, -0.001]), _floor().Clone(), "floor"
+            RigidTransform([0.0, 0.0, FLOOR_Z]), _floor().Clone(), "floor"
         )
         floor.set_illustration_properties(IllustrationProperties())
         plant.RegisterVisualGeometry(world, floor)
@@ -98,7 +98,7 @@ def _floor() -> Mesh:
     """Returns the floor as a mesh, since other Drake shapes have one colour."""
     side = _TILES + 1
     obj = ["mtllib floor.mtl"]
-    corners = [(k - _TILES / 2) * _TILE for k in range(side)]
+    corners = [(k - _TILES / 2) * TILE for k in range(side)]
     obj += [f"v {x} {y} 0" for x in corners for y in corners]
     for parity, material in enumerate(("light", "dark")):
         obj.append(f"usemtl {material}")

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from pydrake.common.yaml import yaml_load_typed
+from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 from pydrake.systems.analysis import SimulatorConfig
 from pydrake.visualization import VisualizationConfig
 
@@ -181,6 +181,14 @@ def LoadScenario(
             scenario = _overlaid(scenario, text)
     scenario.check()
     return scenario
+
+
+def DumpScenario(scenario: Scenario) -> str:
+    """Returns a scenario as YAML text, of which LoadScenario makes the same one."""
+    text: str = yaml_dump_typed(scenario)
+    # Drake leaves out what is null.
+    nulls = [name for name, value in vars(scenario).items() if value is None]
+    return text + "".join(f"{name}: null\n" for name in nulls)
 
 
 def _read(path: Path) -> str:

@@ -179,6 +179,16 @@ def _place_on_plan(diagram: Diagram, root: Context) -> None:
         # The smoothed plan exists only after initialization.
         smoother = diagram.GetSubsystemByName("smoother")
         smoother.ExecuteInitializationEvents(smoother.GetMyMutableContextFromRoot(root))
+    PlaceOnPlan(diagram, root)
+
+
+def PlaceOnPlan(diagram: Diagram, root: Context) -> None:
+    """Sets the robot to the present state of its plan.
+
+    Args:
+        diagram: a locomotion diagram that tracks a plan.
+        root: the Context of the simulation.
+    """
     plan_state = diagram.GetSubsystemByName("plan_state")
     context = plan_state.GetMyContextFromRoot(root)
     state = plan_state.GetOutputPort("state").Eval(context)

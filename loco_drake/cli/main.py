@@ -17,6 +17,7 @@ from loco_drake.common.files import check_writable
 # What each command does.
 _COMMANDS = {
     "simulate": "simulate a robot that performs a gait",
+    "drive": "drive a robot with keys, sliders or a gamepad",
     "generate": "generate motion and write Motion files",
     "retarget": "retarget recordings to a robot",
     "data list": "list the sources of motion and their licences",
@@ -37,7 +38,7 @@ _COMMANDS = {
 _MODULES = {"data list": "data", "data fetch": "fetch", "data inspect": "data"}
 _HELP = ("-h", "--help")
 # Options that name an output. Whether it is writable is checked before the work.
-_OUTPUTS = ("json", "html", "out", "figures")
+_OUTPUTS = ("json", "html", "out", "figures", "record")
 _ONE_FILE = ("report", "export", "data inspect")  # --out is a file
 # Libraries that Drake needs and a bare Debian or Ubuntu lacks.
 _LIBRARIES = "libx11-6 libsm6 libglib2.0-0"

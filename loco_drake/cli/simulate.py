@@ -1,25 +1,26 @@
 """``loco-drake simulate``: simulates a robot that performs a gait."""
 
-import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from loco_drake.cli.options import Json, Policy, option
-from loco_drake.cli.output import print_table, write_json
+from loco_drake.cli.output import write_json
+from loco_drake.cli.simulation import (
+    Pace,
+    check_duration,
+    override,
+    print_figures,
+    save_page,
+    start_meshcat,
+)
 from loco_drake.common.errors import InputError
-from loco_drake.common.files import atomic_path
 from loco_drake.motion.gaits import parse_schedule
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.motion_file import load_motion
 
 if TYPE_CHECKING:
-    from pydrake.geometry import Meshcat
-
     from loco_drake.systems.scenario import Scenario
-
-_MAX_DURATION = 3600.0
 
 
 @dataclass(kw_only=True)
@@ -35,11 +36,17 @@ class Simulate:
     duration: Annotated[float | None, option(metavar="FLOAT", default="10.0")] = None
     # Seed of the generated motion.
     seed: Annotated[int | None, option(metavar="INT", default="0")] = None
+    # Constant velocity to follow: forward and sideways m/s, yaw rate rad/s. Default:
+    # the motion's own.
+    command: tuple[float, float, float] | None = None
     # gpt, to generate motion during the simulation, or the path of a Motion file.
     reference: Annotated[str | None, option(metavar="STR", default="gpt")] = None
     policy: Policy = None
     # Show the simulation in the browser, at most at real-time speed.
     meshcat: bool = True
+    # Keep the robot in the middle of the page, live and in the replay; otherwise the
+    # camera stays, and the replay shows the whole path.
+    follow: bool = True
     # Meshcat's port. Default: a free one, also if the port is in use.
     port: int | None = None
     # Save a replay as one HTML page.
@@ -64,24 +71,20 @@ class Simulate:
         from loco_drake.evaluation import tracking
 
         scenario, duration, motion = self._read()
-        meshcat = self._start_meshcat()
+        meshcat = None
+        if self.meshcat or self.html is not None:
+            meshcat = start_meshcat(self.port, announce=self.meshcat)
         scenario.plant.visual = meshcat is not None
-        recorder = tracking.Recorder(scenario, meshcat)
+        recorder = tracking.Recorder(scenario, meshcat, follow=self.follow)
+        if self.command is not None:
+            port = recorder.diagram.GetInputPort("command")
+            port.FixValue(recorder.context, self.command)
         recorder.start()
         if meshcat is not None:
             meshcat.StartRecording(frames_per_second=tracking.FRAMES_PER_SECOND)
-        # The first evaluation of the networks sets up torch.
-        recorder.diagram.GetOutputPort("action").Eval(recorder.context)
-        start = time.perf_counter()
-        # Unless Drake does it: outside AdvanceTo, so that the speed printed is true.
+        # Unless Drake waits.
         waits = self.meshcat and scenario.simulator.target_realtime_rate == 0
-
-        def keep_pace(now: float) -> None:
-            ahead = now - (time.perf_counter() - start)
-            if waits and ahead > 0:
-                time.sleep(ahead)
-
-        rollout, wall = recorder.run(duration, keep_pace)
+        rollout, wall = recorder.run(duration, Pace(recorder, waits).keep)
         simulated = (len(rollout.state) - 1) * PLAN_DT
         reference: Any = scenario.reference
         figures = {
@@ -97,11 +100,11 @@ class Simulate:
         if meshcat is not None:
             meshcat.StopRecording()
             meshcat.PublishRecording()
-            tracking.frame(meshcat, rollout.state[POSITION])
+            if not self.follow:
+                tracking.frame(meshcat, rollout.state[POSITION])
             if self.html is not None:
-                with atomic_path(self.html) as temporary:
-                    temporary.write_text(meshcat.StaticHtml())
-        _print(figures)
+                save_page(meshcat, self.html)
+        print_figures("Simulation", figures)
         write_json(self.json, figures)
         return 0
 
@@ -111,7 +114,7 @@ class Simulate:
         Raises:
             InputError: if an option or a field of the scenario is amiss.
         """
-        from loco_drake.control.plan import PLAN_DT
+        from loco_drake.control.driving import check_command
         from loco_drake.systems.scenario import (
             GeneratedReference,
             LoadScenario,
@@ -120,9 +123,9 @@ class Simulate:
         )
 
         scenario = LoadScenario(filename=self.scenario, overlay=self.overlay)
-        _override(scenario, robot=self.robot)
+        override(scenario, robot=self.robot)
         names = ("contact", "time_step", "friction")
-        _override(scenario.plant, **{name: getattr(self, name) for name in names})
+        override(scenario.plant, **{name: getattr(self, name) for name in names})
         if self.policy is not None:
             scenario.policy = TrainedPolicy(weights=self.policy)
         if self.reference == "gpt":
@@ -138,16 +141,16 @@ class Simulate:
         reference = scenario.reference
         if isinstance(reference, GeneratedReference):
             given = {"gait": self.gait, "seed": self.seed, "duration": self.duration}
-            _override(reference, **given)
+            override(reference, **given)
             duration = reference.duration
         else:
             duration = 10.0 if self.duration is None else self.duration
-        if not PLAN_DT <= duration <= _MAX_DURATION:
-            raise InputError(
-                f"The duration must be above 0 s, at least a sample of {PLAN_DT} s, "
-                f"and at most {_MAX_DURATION:g} s, not {duration}."
-            )
+        check_duration(duration)
         scenario.check()
+        if self.command is not None:
+            check_command(self.command)
+            if scenario.steering is None:
+                raise InputError("--command needs a scenario with steering.")
         if not isinstance(scenario.policy, TrainedPolicy):
             raise InputError("The policy of a scenario to simulate must be trained.")
         if isinstance(reference, GeneratedReference):
@@ -169,47 +172,3 @@ class Simulate:
                 f"{scenario.robot}."
             )
         return scenario, min(duration, motion.duration), motion
-
-    def _start_meshcat(self) -> "Meshcat | None":
-        from loco_drake.evaluation.tracking import dress
-
-        if not self.meshcat and self.html is None:
-            return None
-        meshcat = _open_meshcat(self.port)
-        dress(meshcat)
-        if self.meshcat:
-            print(f"Meshcat: {meshcat.web_url()}", flush=True)
-        return meshcat
-
-
-def _override(config: Any, **given: Any) -> None:
-    """Sets the fields that are not None."""
-    for name, value in given.items():
-        if value is not None:
-            setattr(config, name, value)
-
-
-def _open_meshcat(port: int | None) -> "Meshcat":
-    """Returns a Meshcat at ``port``, or at a free one if that is in use."""
-    from pydrake.geometry import Meshcat, MeshcatParams
-
-    if port is None:
-        return Meshcat()
-    if not (1024 <= port <= 65535):
-        raise InputError(f"The port must be from 1024 to 65535, not {port}.")
-    try:
-        return Meshcat(MeshcatParams(port=port))
-    except RuntimeError:
-        print(f"Port {port} is in use; Meshcat takes a free one.", file=sys.stderr)
-        return Meshcat()
-
-
-def _print(figures: dict[str, object]) -> None:
-    units = {"_rad": "rad", "_mps": "m/s", "_m": "m", "_s": "s", "_return": "of 100"}
-    rows = []
-    for name, value in figures.items():
-        text = f"{value:.3f}" if isinstance(value, float) else str(value)
-        suffix = next((suffix for suffix in units if name.endswith(suffix)), "")
-        title = name if suffix == "_return" else name.removesuffix(suffix)
-        rows.append((title.replace("_", " "), text, units.get(suffix, "")))
-    print_table("Simulation", ("figure", "value", "unit"), rows)

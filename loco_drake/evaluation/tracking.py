@@ -38,7 +38,9 @@ from loco_drake.control.state import (
 from loco_drake.models.robots import Robot
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.quality import stance_slip_speeds
+from loco_drake.systems.command_source import CommandSource
 from loco_drake.systems.diagram import AddLocomotion
+from loco_drake.systems.follow_camera import FollowCamera
 from loco_drake.systems.scenario import Scenario
 from loco_drake.systems.simulator import MakeSimulator, StartEpisode
 
@@ -67,12 +69,32 @@ class Rollout:
 class Recorder:
     """A locomotion ``diagram`` with a ``simulator`` that logs its ports.
 
-    One diagram serves for any number of episodes. With ``meshcat`` it is drawn.
+    One diagram serves for any number of episodes. With ``meshcat`` it is drawn, and
+    with ``follow`` it stays in the middle of the page. A ``source`` gives command and
+    gait; its robot is simulated on when it has fallen, since a driver can put it
+    upright again.
     """
 
-    def __init__(self, scenario: Scenario, meshcat: Meshcat | None = None) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        meshcat: Meshcat | None = None,
+        *,
+        source: CommandSource | None = None,
+        follow: bool = False,
+    ) -> None:
         builder = DiagramBuilder()
         self._made = AddLocomotion(builder, scenario, meshcat=meshcat)
+        self._ends_at_fall = source is None
+        if source is not None:
+            builder.AddNamedSystem("command_source", source)
+            for name in ("command", "gait"):
+                port = self._made.inputs.pop(name)
+                builder.Connect(source.GetOutputPort(name), port)
+        if follow and meshcat is not None:
+            camera = FollowCamera(self._made.robot, meshcat)
+            builder.AddNamedSystem("follow_camera", camera)
+            builder.Connect(self._made.outputs["state"], camera.GetInputPort("state"))
         self._logs = [
             LogVectorOutput(self._made.outputs[name], builder, publish_period=PLAN_DT)
             for name in _LOGGED
@@ -81,7 +103,7 @@ class Recorder:
         self.diagram = builder.Build()
         self.simulator = MakeSimulator(self.diagram, scenario)
         self.simulator.set_monitor(self._monitor)
-        self._fell = False
+        self.fell = False
 
     @property
     def context(self) -> Context:
@@ -93,7 +115,7 @@ class Recorder:
         for log in self._logs:
             log.FindMutableLog(self.context).Clear()
         StartEpisode(self.simulator, **episode)
-        self._fell = False
+        self.fell = False
 
     def run(
         self, duration: float, after_step: Callable[[float], None] | None = None
@@ -109,35 +131,39 @@ class Recorder:
         """
         steps = round(duration / PLAN_DT)
         wall, done = 0.0, 0
-        while done < steps and not self._fell:
+        while done < steps and not self.fell:
             start = time.perf_counter()
             self.simulator.AdvanceTo((done + 1) * PLAN_DT)
             wall += time.perf_counter() - start
-            if not self._fell:
+            if not self.fell:
                 done += 1
                 if after_step is not None:
                     after_step(done * PLAN_DT)
+        return self.rollout(done, steps), wall
+
+    def rollout(self, done: int, steps: int) -> Rollout:
+        """Returns the record of the first ``done`` of ``steps`` control periods."""
         # Copies, since the logs are cleared. A sample at the moment of a fall is left
         # out: its step was lost.
         state, plan_state, path_time, desired_state, reward_terms = (
             log.FindLog(self.context).data().T[: done + 1].copy() for log in self._logs
         )
-        rollout = Rollout(
+        return Rollout(
             state=state,
             plan_state=plan_state,
             path_time=path_time[:, 0],
             desired_joints=desired_state[:, :12],
             reward=reward_terms.sum(axis=1),
             steps=steps,
-            fell=self._fell,
+            fell=self.fell,
         )
-        return rollout, wall
 
     def _monitor(self, root: Context) -> EventStatus:
         plant, instance = self._made.plant, self._made.instance
         q = plant.GetPositions(plant.GetMyContextFromRoot(root), instance)
         if has_fallen(self._made.robot, unit_base(np.asarray(q))):
-            self._fell = True
+            self.fell = True
+        if self.fell and self._ends_at_fall:
             return EventStatus.ReachedTermination(plant, "the robot fell")
         return EventStatus.DidNothing()
 

@@ -76,7 +76,7 @@ DURATION = "The duration must be above 0"
 
 # Arguments, in which FILES/ stands for the folder above, and what is said of them.
 WRONG = {
-    "fly": "Unknown command 'fly'; the choices are simulate, generate, .*train tracker",
+    "fly": "Unknown command 'fly'; the choices are simulate, drive, .*train tracker",
     "train": "Name a subcommand: train tokenizer, train generator, train tracker",
     "train fly": "'train fly'; the choices are train tokenizer, train generator",
     "data": "Name a subcommand: data list, data fetch, data inspect",

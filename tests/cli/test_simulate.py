@@ -3,10 +3,8 @@ import re
 import socket
 
 import pytest
-import torch
 
 from loco_drake.cli.main import main
-from loco_drake.control.actor import Actor, ActorConfig, save_actor
 from loco_drake.motion.motion_file import save_motion
 from tests.synthetic_motion import synthetic_motion
 
@@ -23,21 +21,6 @@ KEYS = {
     "speed_mps",
     "real_time_factor",
 }
-
-
-@pytest.fixture(scope="module")
-def weights(tmp_path_factory):
-    """Policies that know nothing: one leaves the reference alone, one tumbles."""
-    folder = tmp_path_factory.mktemp("weights")
-    for name, bias in (("calm", 0.0), ("wild", 8.0)):
-        actor = Actor(ActorConfig(robot="go2", labels=["dog-trot"]))
-        last = actor.layers[-1]
-        with torch.no_grad():
-            last.weight.zero_()
-            # Stretches the front legs and folds the rear ones.
-            last.bias.copy_(bias * torch.tensor([0, 1, 1] * 2 + [0, -1, -1] * 2))
-        save_actor(actor, folder / f"{name}.safetensors")
-    return folder
 
 
 def simulate(folder, *arguments):
@@ -198,3 +181,30 @@ def test_options_of_generated_motion_do_not_go_with_a_scenarios_file(tmp_path, c
     line = ["simulate", "--no-meshcat", "--overlay", overlay, "--gait", "dog-trot"]
     assert main(line) == 2
     assert "add --reference gpt" in capsys.readouterr().err
+
+
+def test_a_constant_command_is_followed(weights, tmp_path):
+    """It turns the slow, straight motion of the default into a fast turn."""
+    line = ("--duration", 2, "--no-meshcat", "--policy", weights / "calm.safetensors")
+    free = simulate(tmp_path, *line)
+    slow = simulate(tmp_path, *line, "--command", 0.4, 0.0, 0.0)
+    assert 0.2 < slow["speed_mps"] < 0.6 < free["speed_mps"]
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ("nan 0 0", "A command's forward must be a number from -4 to 4, not nan"),
+        ("0 inf 0", "A command's sideways must be a number from -2 to 2, not inf"),
+        ("0 0 9", "A command's yaw rate must be a number from -4 to 4, not 9"),
+    ],
+)
+def test_commands_beyond_sense_are_refused(command, message, capsys):
+    assert main(["simulate", "--no-meshcat", "--command", *command.split()]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_command_needs_steering(capsys):
+    line = ["simulate", "--no-meshcat", "--command", "1", "0", "0", "--overlay"]
+    assert main([*line, "steering: null"]) == 2
+    assert "--command needs a scenario with steering" in capsys.readouterr().err

@@ -1,0 +1,302 @@
+"""``loco-drake drive``: a person, a table or a recorded drive steers a robot."""
+
+import hashlib
+import signal
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+import numpy as np
+
+from loco_drake.cli.options import Json, Policy, option
+from loco_drake.cli.output import write_json
+from loco_drake.cli.simulation import (
+    Pace,
+    check_duration,
+    override,
+    print_figures,
+    save_page,
+    start_meshcat,
+)
+from loco_drake.common.errors import InputError
+from loco_drake.motion.gaits import LABELS, parse_label
+
+if TYPE_CHECKING:
+    from loco_drake.control.drive_file import Drive as DriveFile
+    from loco_drake.control.driving import OrderTable
+    from loco_drake.systems.meshcat_driver import MeshcatDriver
+    from loco_drake.systems.scenario import Scenario
+
+# Seconds that a table of commands is driven on after its last row.
+_AFTER = 3.0
+_DIFFERS = (
+    "loco-drake: The states differ from the recorded ones, since another machine or "
+    "other versions of the libraries computed them."
+)
+
+
+@dataclass(kw_only=True)
+class Drive:
+    """Drive a robot: keys, sliders, buttons and a gamepad on Meshcat's page."""
+
+    # Robot: go2 or a1.
+    robot: Annotated[str | None, option(metavar="STR", default="go2")] = None
+    # Gait label at the beginning, such as dog-trot.
+    gait: Annotated[str | None, option(metavar="STR", default="dog-trot")] = None
+    # Seconds to drive. Default: until it is stopped by Ctrl-C or the page's button;
+    # with --commands, 3 s after the last row; with --replay, as recorded.
+    duration: float | None = None
+    # Seed of the generated motion.
+    seed: Annotated[int | None, option(metavar="INT", default="0")] = None
+    # Drive by a table of times and commands: CSV that begins with the line
+    # time,forward,sideways,yaw_rate and may add the columns gait, push and reset. Units
+    # are s, m/s, rad/s and N s to the left.
+    commands: Path | None = None
+    # Record the drive in this file.
+    record: Path | None = None
+    # Repeat a recorded drive to the last bit.
+    replay: Path | None = None
+    policy: Policy = None
+    # Show the drive in the browser, at most at real-time speed. Needed unless there is
+    # a table of commands or a recorded drive.
+    meshcat: bool = True
+    # Meshcat's port. Default: a free one, also if the port is in use.
+    port: int | None = None
+    # Save a replay as one HTML page.
+    html: Path | None = None
+    # Scenario in YAML, see loco_drake.systems.scenario.
+    scenario: Annotated[Path | None, option(metavar="PATH")] = None
+    # YAML that overrides fields of the scenario, as in "plant: {friction: 0.5}".
+    overlay: Annotated[str | None, option(metavar="TEXT")] = None
+    json: Json = None
+
+    def run(self) -> int:
+        """Drives, prints and writes; returns the exit status."""
+        from loco_drake.cli.drive_view import DriveView
+        from loco_drake.control.drive_file import save_drive, states_sha256
+        from loco_drake.control.plan import PLAN_DT
+        from loco_drake.evaluation.driving import drive
+        from loco_drake.evaluation.tracking import (
+            FRAMES_PER_SECOND,
+            Recorder,
+            tracking_metrics,
+        )
+        from loco_drake.systems.command_source import CommandSource
+        from loco_drake.systems.meshcat_driver import MeshcatDriver
+
+        recorded = self._read_replay()
+        scenario = self._read_scenario(recorded)
+        table = self._read_table(scenario, recorded)
+        header = _header(scenario, recorded)
+        duration = self._duration(table, recorded)
+        meshcat = driver = None
+        if self.meshcat or self.html is not None:
+            meshcat = start_meshcat(self.port, announce=self.meshcat)
+        if table is not None:
+            source = CommandSource(table.at)
+        else:
+            assert meshcat is not None
+            driver = MeshcatDriver(meshcat, LABELS, parse_label(header["gait"]))
+            source = CommandSource(driver.sample)
+        scenario.plant.visual = meshcat is not None
+        recorder = Recorder(scenario, meshcat, source=source, follow=True)
+        recorder.start()
+        if meshcat is not None and self.html is not None:
+            meshcat.StartRecording(frames_per_second=FRAMES_PER_SECOND)
+        steps = None if duration is None else round(duration / PLAN_DT)
+        # Unless Drake waits.
+        waits = self.meshcat and scenario.simulator.target_realtime_rate == 0
+        pace = Pace(recorder, waits)
+        with _Stop(driver) as stop, DriveView(recorder, meshcat, driver) as view:
+            if steps is None:
+                print("Drive on that page; its Stop button or Ctrl-C ends.", flush=True)
+
+            def after_step(now: float, orders: Any) -> bool:
+                view.update(now, orders)
+                pace.keep(now)
+                return not stop.asked
+
+            driven = drive(recorder, steps, after_step)
+        rollout = driven.rollout
+        simulated = rollout.steps * PLAN_DT
+        states = states_sha256(rollout.state)
+        figures: dict[str, Any] = {
+            "robot": header["robot"],
+            "gait": header["gait"],
+            "seed": header["seed"],
+            "duration_s": simulated if duration is None else duration,
+            "simulated_s": simulated,
+            "fell": rollout.fell,
+            "falls": driven.falls,
+            **tracking_metrics(rollout),
+            "real_time_factor": simulated / driven.wall,
+            "wall_clock_s": pace.elapsed,
+        }
+        if self.record is not None:
+            outcome = {"steps": rollout.steps, "states_sha256": states}
+            save_drive(self.record, driven.table, **header, **outcome)
+        if recorded is not None and rollout.steps == recorded.header["steps"]:
+            figures["identical"] = states == recorded.header["states_sha256"]
+        if meshcat is not None and self.html is not None:
+            meshcat.StopRecording()
+            meshcat.PublishRecording()
+            save_page(meshcat, self.html)
+        print_figures("Drive", figures)
+        write_json(self.json, figures)
+        if not figures.get("identical", True):
+            print(_DIFFERS, file=sys.stderr)
+        return 0
+
+    def _read_replay(self) -> "DriveFile | None":
+        """Returns the recorded drive to repeat, if any.
+
+        Raises:
+            InputError: if it is damaged, or an option contradicts it.
+        """
+        if self.replay is None:
+            if self.commands is None and not self.meshcat:
+                raise InputError(
+                    "Without Meshcat a drive needs a table of commands or a recorded "
+                    "drive: add --commands or --replay."
+                )
+            return None
+        fixed = ("robot", "gait", "seed", "commands", "scenario", "overlay")
+        for name in fixed:
+            if getattr(self, name) is not None:
+                raise InputError(
+                    f"A recorded drive has its own {name}: leave out --{name}."
+                )
+        from loco_drake.control.drive_file import load_drive
+
+        return load_drive(self.replay)
+
+    def _read_scenario(self, recorded: "DriveFile | None") -> "Scenario":
+        """Returns what to simulate.
+
+        Raises:
+            InputError: if a field is amiss.
+        """
+        from loco_drake.systems.scenario import (
+            GeneratedReference,
+            LoadScenario,
+            TrainedPolicy,
+        )
+
+        if recorded is not None:
+            scenario = LoadScenario(data=recorded.header["scenario"])
+        else:
+            scenario = LoadScenario(filename=self.scenario, overlay=self.overlay)
+        override(scenario, robot=self.robot)
+        if self.policy is not None:
+            scenario.policy = TrainedPolicy(weights=self.policy)
+        if not isinstance(scenario.reference, GeneratedReference):
+            raise InputError("The reference of a scenario to drive must be generated.")
+        override(scenario.reference, gait=self.gait, seed=self.seed)
+        scenario.disturbances.pushes = True
+        scenario.check()
+        if scenario.steering is None or not isinstance(scenario.policy, TrainedPolicy):
+            raise InputError(
+                "A scenario to drive must have steering and a trained policy."
+            )
+        if str(scenario.reference.gait) not in map(str, LABELS):
+            raise InputError(
+                "A drive begins with one gait, such as dog-trot, not with a schedule; "
+                "buttons or a table of commands change it."
+            )
+        return scenario
+
+    def _read_table(
+        self, scenario: "Scenario", recorded: "DriveFile | None"
+    ) -> "OrderTable | None":
+        """Returns the orders to follow; None for those of a person.
+
+        Raises:
+            InputError: if a row is amiss, or the generator does not know a gait.
+        """
+        from loco_drake.control.driving import GAIT, read_commands
+        from loco_drake.generation.motion_model import pretrained_motion_model
+
+        if recorded is not None:
+            table = recorded.table
+        elif self.commands is not None:
+            reference: Any = scenario.reference
+            table = read_commands(self.commands, str(reference.gait))
+        else:
+            return None
+        labels = table.rows[:, GAIT].astype(np.int64)
+        pretrained_motion_model(scenario.robot).check_labels(labels)
+        return table
+
+    def _duration(
+        self, table: "OrderTable | None", recorded: "DriveFile | None"
+    ) -> float | None:
+        """Returns how long to drive, s; None for no end."""
+        from loco_drake.control.plan import PLAN_DT
+
+        duration = self.duration
+        if duration is None:
+            if recorded is not None:
+                duration = recorded.header["steps"] * PLAN_DT
+            elif table is not None:
+                duration = float(table.times[-1]) + _AFTER
+        if duration is not None:
+            check_duration(duration)
+        return duration
+
+
+def _header(scenario: "Scenario", recorded: "DriveFile | None") -> dict[str, Any]:
+    """Returns what a recorded drive says of its scenario.
+
+    Raises:
+        InputError: if the weights of the policy are not those of ``recorded``.
+    """
+    from loco_drake.models.robots import get_robot
+    from loco_drake.models.shipped import policy_path
+    from loco_drake.systems.scenario import DumpScenario
+
+    policy: Any = scenario.policy
+    path = policy_path(get_robot(scenario.robot), policy.weights)
+    if not path.is_file():
+        raise InputError(f"There are no policy weights at {str(path)!r}.")
+    weights = hashlib.sha256(path.read_bytes()).hexdigest()
+    if recorded is not None and weights != recorded.header["policy_sha256"]:
+        raise InputError(
+            f"The weights at {path} are not those of the recorded drive; name these "
+            "with --policy."
+        )
+    reference: Any = scenario.reference
+    return {
+        "robot": scenario.robot,
+        "gait": str(reference.gait),
+        "seed": int(reference.seed),
+        "scenario": DumpScenario(scenario),
+        "policy_sha256": weights,
+    }
+
+
+class _Stop:
+    """Whether a drive is to end: after Ctrl-C, or the button on the page.
+
+    A second Ctrl-C interrupts as usual.
+    """
+
+    def __init__(self, driver: "MeshcatDriver | None") -> None:
+        self._driver = driver
+        self._interrupted = False
+
+    @property
+    def asked(self) -> bool:
+        pressed = self._driver is not None and self._driver.stopped
+        return self._interrupted or pressed
+
+    def __enter__(self) -> Self:
+        self._before = signal.signal(signal.SIGINT, self._interrupt)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+    def _interrupt(self, number: int, frame: object) -> None:
+        self._interrupted = True
+        signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -1,0 +1,163 @@
+"""A driver's controls on Meshcat's page: keys, sliders, buttons and a gamepad."""
+
+from collections.abc import Sequence
+from html import escape
+from math import isfinite
+
+import numpy as np
+from pydrake.geometry import Meshcat
+
+from loco_drake.common.arrays import Array
+from loco_drake.control.driving import COMMAND, GAIT, ORDERS, PUSH, RESET
+from loco_drake.motion.gaits import LABELS, GaitLabel
+
+# Name, least, most, step, and the keys to go down and up. Of a command, in its order.
+SLIDERS = (
+    ("forward m/s (W, S)", -1.5, 3.5, 0.1, "KeyS", "KeyW"),
+    ("sideways m/s (A, D)", -1.0, 1.0, 0.1, "KeyD", "KeyA"),
+    ("turning rad/s (Q, E)", -2.0, 2.0, 0.1, "KeyE", "KeyQ"),
+)
+HALT = "Halt (Space)"
+RESET_BUTTON = "Put upright (R)"
+STOP = "Stop (Esc)"
+# A push, N s to the left.
+PUSHES = {"Push left (arrow)": 6.0, "Push right (arrow)": -6.0}
+_KEYS = {
+    HALT: "Space",
+    "Push left (arrow)": "ArrowLeft",
+    "Push right (arrow)": "ArrowRight",
+    RESET_BUTTON: "KeyR",
+    STOP: "Escape",
+}
+_PUSH_PAUSE = 0.5  # s; a key that is held down repeats itself
+
+# Axes of a standard gamepad and what they command at full deflection; all of them
+# point right or down, and the command forward or left.
+_AXES = ((1, -2.0), (0, -0.6), (2, -1.5))
+_DEAD_ZONE = 0.1
+
+_TEXT = (
+    '<div style="position:fixed;left:92px;top:6px;font:15px/1.4 sans-serif;'
+    'color:#222;text-shadow:none;white-space:pre;pointer-events:none">{}</div>'
+)
+
+
+class MeshcatText:
+    """Text in the upper left corner of Meshcat's page.
+
+    Meshcat has no text of its own, but shows the name of a button as HTML. It also puts
+    the name into JavaScript, where a quote or a new line would be an error.
+    """
+
+    def __init__(self, meshcat: Meshcat) -> None:
+        self._meshcat = meshcat
+        self._shown = ""
+
+    def show(self, *lines: str) -> None:
+        """Replaces what is shown."""
+        text = _TEXT.format("<br>".join(map(escape, lines)))
+        if text == self._shown:
+            return
+        if self._shown:
+            self._meshcat.DeleteButton(self._shown)
+        self._meshcat.AddButton(text)
+        self._shown = text
+
+
+class MeshcatDriver:
+    """Adds a driver's controls to Meshcat's page and reads them.
+
+    The command is the sum of sliders and gamepad. Values that are not finite or beyond
+    their range are limited, and a gamepad that is gone counts as let go;
+    :attr:`notes` says so.
+
+    Args:
+        meshcat: the Meshcat whose page gets the controls.
+        labels: gaits to choose from.
+        gait: the gait at the beginning.
+    """
+
+    def __init__(
+        self, meshcat: Meshcat, labels: Sequence[GaitLabel], gait: GaitLabel
+    ) -> None:
+        self._meshcat = meshcat
+        self._gait = LABELS.index(gait)
+        self._pushed = -_PUSH_PAUSE
+        self._had_gamepad = False
+        #: What was limited or is missing, for the driver to see.
+        self.notes: tuple[str, ...] = ()
+        for name, low, high, step, down, up in SLIDERS:
+            meshcat.AddSlider(name, low, high, step, 0.0, down, up)
+        self._gaits: dict[str, int] = {}
+        for number, label in enumerate(labels, 1):
+            key = f" ({number % 10})" if number <= 10 else ""
+            self._gaits[f"{label}{key}"] = LABELS.index(label)
+            meshcat.AddButton(f"{label}{key}", f"Digit{number % 10}" if key else "")
+        for name, key in _KEYS.items():
+            meshcat.AddButton(name, key)
+        self._clicks = dict.fromkeys((*self._gaits, *_KEYS), 0)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the button to stop was pressed."""
+        return self._meshcat.GetButtonClicks(STOP) > 0
+
+    def sample(self, time: float) -> Array:
+        """Returns the orders that the controls give now, see :mod:`.control.driving`.
+
+        Args:
+            time: the simulation's time, s; pushes are at least half a second apart.
+        """
+        pressed = self._pressed()
+        if HALT in pressed:
+            for name, *_ in SLIDERS:
+                self._meshcat.SetSliderValue(name, 0.0)
+        orders = np.zeros(ORDERS)
+        orders[COMMAND] = self._command()
+        for name in pressed & self._gaits.keys():
+            self._gait = self._gaits[name]
+        orders[GAIT] = self._gait
+        pushes = sorted(pressed & PUSHES.keys())
+        if pushes and time >= self._pushed + _PUSH_PAUSE:
+            orders[PUSH] = PUSHES[pushes[0]]
+            self._pushed = time
+        orders[RESET] = RESET_BUTTON in pressed
+        return orders
+
+    def _pressed(self) -> set[str]:
+        """Returns the buttons that were pressed since the last call."""
+        clicks = {name: self._meshcat.GetButtonClicks(name) for name in self._clicks}
+        pressed = {name for name in clicks if clicks[name] > self._clicks[name]}
+        self._clicks = clicks
+        return pressed
+
+    def _command(self) -> Array:
+        low, high = (np.array([slider[k] for slider in SLIDERS]) for k in (1, 2))
+        sliders = np.array([self._meshcat.GetSliderValue(name) for name, *_ in SLIDERS])
+        asked = sliders + self._gamepad()
+        command = np.clip(np.where(np.isfinite(asked), asked, 0.0), low, high)
+        if not np.array_equal(command, asked):
+            self.notes = (*self.notes, "command limited")
+        return command
+
+    def _gamepad(self) -> Array:
+        """Returns what the gamepad commands, 0 without one, shape (3,)."""
+        pad = self._meshcat.GetGamepad()
+        # One that was pulled out keeps its index and loses its axes. A page that was
+        # closed leaves the last state behind.
+        there = bool(pad.axes) and self._meshcat.GetNumActiveConnections() > 0
+        axes = list(pad.axes) if there else []
+        self._had_gamepad |= there
+        notes = []
+        if self._had_gamepad and not there:
+            notes.append("gamepad is gone")
+        command = np.zeros(3)
+        for k, (axis, most) in enumerate(_AXES):
+            value = axes[axis] if axis < len(axes) else 0.0
+            if not (isfinite(value) and abs(value) <= 1.0):
+                value = min(max(value, -1.0), 1.0) if isfinite(value) else 0.0
+                notes.append("gamepad limited")
+            if abs(value) > _DEAD_ZONE:
+                command[k] = most * value
+        self.notes = tuple(dict.fromkeys(notes))
+        return command
