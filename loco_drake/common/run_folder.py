@@ -182,8 +182,9 @@ def settings(options: Mapping[str, Any], *without: str) -> dict[str, Any]:
 
 
 def options_of(config: Any) -> dict[str, Any]:
-    """Returns a dataclass as nested JSON; paths are text."""
-    options: dict[str, Any] = json.loads(json.dumps(asdict(config), default=str))
+    """Returns a dataclass as nested JSON; paths and infinity are text."""
+    text = json.dumps(asdict(config), default=str)
+    options: dict[str, Any] = json.loads(text, parse_constant=str)
     return options
 
 
@@ -203,7 +204,8 @@ def with_options(config: Config, options: Mapping[str, Any]) -> Config:
                 values[name] = updated(value, values[name])
         return values
 
-    return convert(updated(options_of(config), options), type(config))
+    values = updated(options_of(config), options)
+    return convert(values, type(config), numeric_text=True)
 
 
 def learning_tensors(
