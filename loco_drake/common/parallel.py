@@ -54,7 +54,14 @@ def _map(
         initargs=(make,),
     )
     try:
-        yield from executor.map(_call, items)
+        # Ctrl-C reaches the whole process group; only the main process handles it. The
+        # workers, which start here, inherit that it is blocked.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            results = executor.map(_call, items)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        yield from results
     except BrokenProcessPool:
         raise ChildProcessError("A worker process died.") from None
     finally:
@@ -62,8 +69,6 @@ def _map(
 
 
 def _start(make: Callable[[], Callable[[Any], Any]]) -> None:
-    # Ctrl-C reaches the whole process group; only the main process handles it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     use_one_thread()
     global _function
     _function = make()

@@ -60,14 +60,19 @@ def make_sleeper():
 SCRIPT = """
 from loco_drake.common.parallel import map_in_workers
 from tests.common.test_parallel import make_sleeper
+def items():
+    yield from [0.2] * 1000
+    print("started", flush=True)
+
 if __name__ == "__main__":
-    for _ in map_in_workers(make_sleeper, [0.2] * 1000, 2):
+    for _ in map_in_workers(make_sleeper, items(), 2):
         print("one", flush=True)
 """
 
 
-def test_ctrl_c_ends_the_workers(tmp_path):
-    """Both workers are gone soon after, without a traceback of theirs."""
+@pytest.mark.parametrize("after", ["started", "one"])
+def test_ctrl_c_ends_the_workers(after, tmp_path):
+    """Both are gone soon after, without a traceback of theirs, at work or not yet."""
     script = tmp_path / "script.py"
     script.write_text(HEAR_CTRL_C + SCRIPT)
     process = subprocess.Popen(
@@ -78,7 +83,8 @@ def test_ctrl_c_ends_the_workers(tmp_path):
         start_new_session=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )
-    assert process.stdout.readline() == "one\n"
+    while process.stdout.readline() != f"{after}\n":
+        pass
     os.killpg(process.pid, signal.SIGINT)
     # The pipes close when the last process that holds them has ended.
     _, errors = process.communicate(timeout=LIMIT)
