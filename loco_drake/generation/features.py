@@ -62,10 +62,7 @@ def motion_features(robot: Robot, motion: Motion) -> Array:
 def positions(robot: Robot, features: Array, path: Array) -> Array:
     """Returns q = [R_WB as w x y z, p_WB, joints], shape (..., T, 19).
 
-    Args:
-        robot: gives the unit of length.
-        features: shape (..., T, SIZE).
-        path: x, y, yaw of each frame, shape (..., T, 3).
+    Features are (..., T, SIZE); ``path`` is x, y, yaw of each frame, (..., T, 3).
     """
     half_roll, half_pitch = np.moveaxis(features[..., ROLL_PITCH], -1, 0) / 2
     zero = np.zeros_like(half_roll)

@@ -53,16 +53,10 @@ def start_footing(pose: Array) -> Footing:
 def step_footing(
     robot: Robot, footing: Footing, features: Array
 ) -> tuple[Footing, Array, NDArray[np.bool_]]:
-    """Places T frames of B motions in the world.
+    """Places T frames of B motions in the world, from the footing of the frame before.
 
-    Args:
-        robot: the robot.
-        footing: after the frame before.
-        features: with contacts as probabilities, shape (B, T, SIZE).
-
-    Returns:
-        Footing after the last frame; q as in :func:`features.positions`, shape
-        (B, T, 19); contacts, shape (B, T, 4).
+    Contacts in features (B, T, SIZE) are probabilities. Returns the footing after the
+    last frame, q (B, T, 19) as in :func:`.features.positions`, and contacts (B, T, 4).
     """
     likely = features[..., ft.CONTACTS]
     pose, shift, anchor = footing.pose, footing.shift, footing.anchor

@@ -52,11 +52,6 @@ def speed_edges(speeds: Iterable[tuple[int, Array]]) -> Array:
     return edges
 
 
-def speed_bin(edges: NDArray[np.floating], label: int, speeds: Array) -> Integers:
-    """Returns the bin of speeds of a label, given :func:`speed_edges`."""
-    return np.searchsorted(edges[label], speeds)
-
-
 def rank_bin(rank: Array) -> Integers:
     """Returns the bin of ranks in [0, 1]."""
     return np.minimum(np.asarray(rank) * BINS, BINS - 1).astype(np.int64)

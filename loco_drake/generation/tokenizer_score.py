@@ -8,13 +8,7 @@ import torch
 from torch import Tensor
 
 from loco_drake.common.determinism import single_thread
-from loco_drake.generation.features import (
-    HEIGHT,
-    JOINTS,
-    ROLL_PITCH,
-    VELOCITY,
-    YAW_RATE,
-)
+from loco_drake.generation import features as ft
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.training_motions import Clip
 from loco_drake.models.robots import get_robot
@@ -43,7 +37,7 @@ class Toes:
         They are relative to the point on the ground under the trunk, in the heading
         frame H. Features (B, T, SIZE) are of the robots with the indices (B,).
         """
-        joints = features[..., JOINTS]  # then leg by leg, (B, T, 4, 3)
+        joints = features[..., ft.JOINTS]  # then leg by leg, (B, T, 4, 3)
         hip, thigh, calf = joints.reshape(*joints.shape[:-1], 4, 3).unbind(-1)
         l1, l2 = self.thigh[robot, None, None], self.calf[robot, None, None]
         side = self.offset[robot][:, None]  # (B, 1, 4)
@@ -53,10 +47,10 @@ class Toes:
         up = hip.sin() * side + hip.cos() * down
         p_B = torch.stack((forward, left, up), dim=-1) + self.hips[robot][:, None]
         x, y, z = p_B.unbind(-1)
-        roll, pitch = features[..., None, ROLL_PITCH].unbind(-1)  # (B, T, 1)
+        roll, pitch = features[..., None, ft.ROLL_PITCH].unbind(-1)  # (B, T, 1)
         y, z = roll.cos() * y - roll.sin() * z, roll.sin() * y + roll.cos() * z
         x, z = pitch.cos() * x + pitch.sin() * z, pitch.cos() * z - pitch.sin() * x
-        height = features[..., HEIGHT] * self.stand_height[robot, None, None]
+        height = features[..., ft.HEIGHT] * self.stand_height[robot, None, None]
         return torch.stack((x, y, z + height), dim=-1)
 
     def velocities(self, features: Tensor, p_HF: Tensor, robot: Tensor) -> Tensor:
@@ -65,8 +59,8 @@ class Toes:
         Uses backward differences in the heading frame of ``p_HF`` from
         :meth:`positions`; the velocity of a stance foot is zero.
         """
-        speed = features[:, 1:, VELOCITY] * self.stand_height[robot, None, None]
-        rate = features[:, 1:, YAW_RATE]  # (B, T - 1, 1)
+        speed = features[:, 1:, ft.VELOCITY] * self.stand_height[robot, None, None]
+        rate = features[:, 1:, ft.YAW_RATE]  # (B, T - 1, 1)
         middle = (p_HF[:, 1:] + p_HF[:, :-1]) / 2
         x, y, _ = middle.unbind(-1)  # (B, T - 1, 4)
         turning = torch.stack((-rate * y, rate * x, torch.zeros_like(x)), dim=-1)
@@ -86,12 +80,9 @@ class TokenizerScore:
 def score_tokenizer(
     tokenizer: Tokenizer, clips: Sequence[Clip], codebooks: int | None = None
 ) -> TokenizerScore:
-    """Returns the reconstruction errors over whole clips.
+    """Returns the reconstruction errors over the whole tokens of clips.
 
-    Args:
-        tokenizer: knows the clips' robots.
-        clips: frames beyond the last whole token are left out.
-        codebooks: decodes these many codebooks only, the coarsest; None: all.
+    Decodes all codebooks, or only so many of the coarsest.
     """
     toes = Toes(tokenizer.config.robots)
     joints, distances = [], []
@@ -102,7 +93,7 @@ def score_tokenizer(
         with torch.inference_mode(), single_thread():
             output = tokenizer.decode(codes, robot)
             apart = toes.positions(output, robot) - toes.positions(target, robot)
-        joints.append((output - target)[..., JOINTS].square().flatten())
+        joints.append((output - target)[..., ft.JOINTS].square().flatten())
         distances.append(apart.square().sum(dim=-1).flatten())
     return TokenizerScore(
         joint_rmse_rad=float(torch.cat(joints).mean().sqrt()),

@@ -52,9 +52,6 @@ class Codes:
     codes: NDArray[np.int64]  # (n, codebooks)
     speeds: NDArray[np.float64]  # see speed_rank.token_speeds, (n,)
 
-    def __len__(self) -> int:
-        return len(self.codes)
-
 
 def encode_clips(
     tokenizer: Tokenizer, clips: Sequence[Clip], codebooks: int
@@ -104,12 +101,7 @@ def train_generator(
 ) -> tuple[Generator, LoopResult]:
     """Trains a generator and writes ``generator.safetensors`` if it was not stopped.
 
-    Args:
-        library: what to learn from.
-        tokenizer: trained on it.
-        config: sizes of the network.
-        settings: of the training.
-        stitched: how many long motions to make for each robot and label.
+    It learns from ``stitched`` long motions on average for each robot and label.
 
     Raises:
         InputError: if the tokenizer does not know a robot of the library, or all
@@ -119,11 +111,8 @@ def train_generator(
     if missing:
         known = ", ".join(tokenizer.config.robots)
         raise InputError(f"The tokenizer knows {known}, not {', '.join(missing)}.")
-    encoded = encode_clips(
-        tokenizer,
-        stitched_clips(library.train, stitched, settings.seed),
-        config.codebooks,
-    )
+    clips = stitched_clips(library.train, stitched, settings.seed)
+    encoded = encode_clips(tokenizer, clips, config.codebooks)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
         generator = Generator(config)
@@ -167,10 +156,10 @@ def make_batch(
     speed_bins = np.empty((batch, length), dtype=np.int64)
     for i, sequence in enumerate(chosen):
         # The token before the window is all that the first step is told.
-        start = random.integers(len(sequence) - length)
+        start = random.integers(len(sequence.codes) - length)
         windows[i] = sequence.codes[start : start + length + 1]
         speeds = sequence.speeds[start + 1 : start + length + 1]
-        speed_bins[i] = speed_rank.speed_bin(edges, sequence.label, speeds)
+        speed_bins[i] = np.searchsorted(edges[sequence.label], speeds)
     windows[random.random(batch) < NO_HISTORY, 0] = config.codebook_size
     before, codes = windows[:, :-1].copy(), windows[:, 1:].copy()
     labels = np.repeat([[sequence.label] for sequence in chosen], length, axis=1)
@@ -207,7 +196,7 @@ def score_generator(
         codes = torch.from_numpy(sequence.codes)[None]
         before = torch.cat((first, codes[:, :-1]), dim=1)
         labels = torch.full(codes.shape[:2], sequence.label)
-        bins = speed_rank.speed_bin(edges, sequence.label, sequence.speeds)
+        bins = np.searchsorted(edges[sequence.label], sequence.speeds)
         batch = (before, labels, torch.from_numpy(bins)[None], duration, codes)
         with torch.inference_mode(), single_thread():
             loss = generator_loss(generator, batch)

@@ -130,11 +130,6 @@ def train_tokenizer(
 ) -> tuple[Tokenizer, LoopResult]:
     """Trains a tokenizer and writes ``tokenizer.safetensors`` if it was not stopped.
 
-    Args:
-        library: what to learn from.
-        config: sizes of the networks.
-        settings: of the training.
-
     Raises:
         InputError: if no clip is as long as a window, or a robot of the library is
             not in the config.
@@ -160,23 +155,17 @@ def train_tokenizer(
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         target, robot, label = windows(random, BATCH)
         losses = tokenizer_losses(learning, toes, scales(label), target, robot)
-        total = sum(
-            (WEIGHTS[name] * loss for name, loss in losses.items()), torch.zeros(())
-        )
+        weighted = (WEIGHTS[name] * loss for name, loss in losses.items())
+        total = sum(weighted, torch.zeros(()))
         return total, {name: loss.item() for name, loss in losses.items()}
 
-    run = {
-        "network": asdict(config),
-        "weights": WEIGHTS,
-        "motions": library.summary,
-    }
+    network, motions = asdict(config), library.summary
+    run = {"network": network, "weights": WEIGHTS, "motions": motions}
     result = train("tokenizer", learning, loss_of_batch, settings, run)
     tokenizer = learning.finish()
     if not result.stopped:
-        info = {
-            "labels": [str(label) for label in library.labels],
-            "training": training_record(library, settings),
-        }
+        labels = [str(label) for label in library.labels]
+        info = {"labels": labels, "training": training_record(library, settings)}
         path = Path(settings.out) / "tokenizer.safetensors"
         save_network(path, "tokenizer", tokenizer, info, half=True)
     return tokenizer, result

@@ -12,17 +12,9 @@ import torch
 from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 
+from loco_drake.common import run_folder
 from loco_drake.common.determinism import single_thread
 from loco_drake.common.progress import progress_bar
-from loco_drake.common.run_folder import (
-    learning_tensors,
-    open_run,
-    options_of,
-    restore_learning,
-    settings,
-    sound,
-    stop_requests,
-)
 from loco_drake.generation.loop_settings import RUN_SETTINGS, LoopSettings
 
 # Returns the loss and figures to log for one batch, drawn with the given generator.
@@ -63,7 +55,9 @@ def train(
     """
     config.check()
     start = time.perf_counter()
-    run = settings({**{key: getattr(config, key) for key in RUN_SETTINGS}, **run})
+    run = run_folder.settings(
+        {**{key: getattr(config, key) for key in RUN_SETTINGS}, **run}
+    )
     run = json.loads(json.dumps(run))  # as a checkpoint gives it back
     optimizer = torch.optim.AdamW(
         module.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
@@ -71,16 +65,16 @@ def train(
     random = np.random.default_rng(config.seed)
     with (
         single_thread(),
-        open_run(
+        run_folder.open_run(
             config.out,
             name,
             f"{name}.safetensors",
             run,
             steps=config.steps,
             resume=config.resume,
-            options=options_of(config),
+            options=run_folder.options_of(config),
         ) as folder,
-        stop_requests() as stop_requested,
+        run_folder.stop_requests() as stop_requested,
         torch.random.fork_rng(devices=[]),
     ):
         torch.manual_seed(config.seed)
@@ -88,11 +82,11 @@ def train(
 
         def save() -> None:
             state = {"steps": step, "random": random.bit_generator.state}
-            folder.save(learning_tensors(module, optimizer), state)
+            folder.save(run_folder.learning_tensors(module, optimizer), state)
 
         if (saved := folder.saved) is not None:
-            restore_learning(saved, module, optimizer)
-            with sound(saved.path):
+            run_folder.restore_learning(saved, module, optimizer)
+            with run_folder.sound(saved.path):
                 random.bit_generator.state = saved.state["random"]
             step = saved.state["steps"]
         module.train()

@@ -79,8 +79,8 @@ def load_library(*folders: Path) -> Library:
         if not Path(folder).is_dir():
             raise InputError(f"There is no folder of Motion files {str(folder)!r}.")
     paths = [path for folder in folders for path in sorted(folder.rglob("*.npz"))]
-    motions = [(path, load_motion(path)) for path in paths]
-    motions = [(path, motion) for path, motion in motions if motion.label in LABELS]
+    loaded = ((path, load_motion(path)) for path in paths)
+    motions = [(path, motion) for path, motion in loaded if motion.label in LABELS]
     if not motions:
         raise InputError(
             f"There are no Motion files (*.npz) with one of the labels "

@@ -25,11 +25,8 @@ class PairedWindows:
 
     A token must mean the same motion for all robots. The tokens of a window are
     therefore decoded for its own robot, and for another robot to which the same stretch
-    of the same recording was retargeted, if there is one.
-
-    Args:
-        clips: at least WINDOW frames each.
-        robots: names of the robots that the tokenizer knows, in its order.
+    of the same recording was retargeted, if there is one. Clips have WINDOW frames or
+    more; the robots are those that the tokenizer knows, in its order.
     """
 
     def __init__(self, clips: Sequence[Clip], robots: Sequence[str]) -> None:

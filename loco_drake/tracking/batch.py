@@ -22,11 +22,6 @@ class TrackingBatch:
     Joint targets, observations, rewards and terminations are computed for all robots at
     once, with the functions that the systems use. For one robot at a time this would
     cost as much as the physics.
-
-    Args:
-        plans: the plans to track.
-        config: configuration of each environment.
-        count: B, the number of robots.
     """
 
     def __init__(

@@ -37,10 +37,6 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
 
     ``info`` contains the reward terms by name, and the plan and sample at which the
     episode started. ``reset(options={"plan": i, "sample": k})`` selects them.
-
-    Args:
-        plans: the plans to track.
-        config: the configuration.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (as in Gymnasium)
@@ -67,16 +63,13 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Advances by one control period."""
         terms, terminated, truncated = self._batch.step(action[None])
-        info = {
-            **self._start(),
-            **dict(zip(REWARD_TERMS, terms[0].tolist(), strict=True)),
-        }
+        named = dict(zip(REWARD_TERMS, terms[0].tolist(), strict=True))
         return (
             self._batch.observe()[0],
             float(terms.sum() - self._batch.penalty[0]),
             bool(terminated[0]),
             bool(truncated[0]),
-            info,
+            {**self._start(), **named},
         )
 
     def _start(self) -> dict[str, int]:

@@ -1,6 +1,6 @@
 """Domain randomization: the distribution from which each episode draws a Domain."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from math import inf
 from typing import TYPE_CHECKING, Any
 
@@ -100,12 +100,8 @@ class RandomizationConfig:
 
     def with_standard(self) -> "RandomizationConfig":
         """Returns a copy in which every part that is off is as in STANDARD."""
-        missing = {
-            part.name: getattr(STANDARD, part.name)
-            for part in fields(self)
-            if getattr(self, part.name) is None
-        }
-        return replace(self, **missing)
+        off = [name for name, value in vars(self).items() if value is None]
+        return replace(self, **{name: getattr(STANDARD, name) for name in off})
 
     @property
     def disturbances(self) -> "Disturbances":

@@ -23,11 +23,8 @@ class PlanSampler:
     shares of episodes would neglect gaits that fall. The square suppresses the part of
     the missing return that is due to action noise, about ten of a hundred. Plans share
     the steps of their label by the same rule, since a label can contain very different
-    motion. Plans not yet drawn have the score of their label.
-
-    Args:
-        plans: what to draw from; the label of a plan is that of its first sample.
-        seed: of the draws.
+    motion. Plans not yet drawn have the score of their label. The label of a plan is
+    that of its first sample.
     """
 
     def __init__(self, plans: list[Plan], seed: int) -> None:
@@ -64,12 +61,10 @@ class PlanSampler:
         return int(self.random.choice(among, p=episodes / episodes.sum()))
 
     def record(self, plan: int, score: float, share: float) -> None:
-        """Records an episode on ``plan``.
+        """Records an episode on the plan with that index.
 
-        Args:
-            plan: index of the plan.
-            score: normalized return, 0 to 1.
-            share: steps that it made over those of an episode, 0 to 1.
+        The score is its normalized return, and the share the steps that it made over
+        those of a whole episode; both are from 0 to 1.
         """
         label = self._labels[plan]
         for mean, value in ((self.scores, score), (self.shares, share)):
@@ -80,11 +75,8 @@ class PlanSampler:
 
     def score_by_label(self) -> dict[str, float]:
         """Returns the mean over its plans of recent normalized returns, 0 to 100."""
-        drawn = ~np.isnan(self.plan_scores)
-        scores = {
-            i: self.plan_scores[drawn & (self._labels == i)] for i in self.present
-        }
-        return {
-            str(ROW_LABELS[i]): 100 * float(own.mean()) if len(own) else 0.0
-            for i, own in scores.items()
-        }
+        drawn, means = ~np.isnan(self.plan_scores), {}
+        for i in self.present:
+            own = self.plan_scores[drawn & (self._labels == i)]
+            means[str(ROW_LABELS[i])] = 100 * float(own.mean()) if len(own) else 0.0
+        return means

@@ -14,21 +14,10 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from torch import Tensor
 
+from loco_drake.common import run_folder
 from loco_drake.common.determinism import single_thread
 from loco_drake.common.errors import InputError
-from loco_drake.common.run_folder import (
-    Checkpoint,
-    RunFolder,
-    learning_tensors,
-    load_module,
-    open_run,
-    options_of,
-    read_checkpoint,
-    restore_learning,
-    settings,
-    sound,
-    stop_requests,
-)
+from loco_drake.common.run_folder import Checkpoint, RunFolder
 from loco_drake.control.actor import ActorConfig, save_actor
 from loco_drake.control.observation import OBSERVATION_LAYOUT
 from loco_drake.control.plan import Plan
@@ -91,10 +80,10 @@ def train_tracker(
     config.check()
     if resume and first is not None:
         raise InputError("Give either a checkpoint to start from or resume, not both.")
-    own = options_of(config)
+    own = run_folder.options_of(config)
     own = {field.name: own[field.name] for field in fields(TrainingConfig)}
     run = {
-        **settings(own, "steps"),
+        **run_folder.settings(own, "steps"),
         "references": f"{len(plans)} motions of {sum(map(len, plans))} samples",
         "observation_layout": _LAYOUT,
     }
@@ -103,7 +92,7 @@ def train_tracker(
     start = time.monotonic()
     with (
         single_thread(),
-        open_run(
+        run_folder.open_run(
             Path(folder),
             NAME,
             POLICY,
@@ -135,7 +124,7 @@ def train_tracker(
                 _restore(learner, sampler, held.saved)
             writer = TensorBoardOutputFormat(str(folder))
             learner.set_logger(Logger(None, [writer]))
-            with stop_requests() as stop_requested:
+            with run_folder.stop_requests() as stop_requested:
                 saver = _Saver(
                     held, log, sampler, config, report, stop_requested, steps_before
                 )
@@ -162,8 +151,8 @@ def train_tracker(
 
 def _beginning(path: Path, hidden: list[int]) -> Checkpoint:
     """Returns a checkpoint whose networks have the required sizes."""
-    saved = read_checkpoint(path, NAME)
-    with sound(path):
+    saved = run_folder.read_checkpoint(path, NAME)
+    with run_folder.sound(path):
         own, layout = saved.run["hidden"], saved.run["observation_layout"] or _LAYOUT
     if own != hidden:
         raise InputError(f"{path} is of networks with --hidden {own}, not {hidden}.")
@@ -179,7 +168,7 @@ def _state(
     statistics = learner.statistics
     # stable-baselines3 shuffles its minibatches with numpy's global generator.
     _, keys, position, has_gauss, gauss = np.random.get_state()  # noqa: NPY002
-    tensors = learning_tensors(learner.policy, learner.policy.optimizer)
+    tensors = run_folder.learning_tensors(learner.policy, learner.policy.optimizer)
     tensors["normalizer/mean"] = torch.from_numpy(statistics.mean)
     tensors["normalizer/variance"] = torch.from_numpy(statistics.var)
     tensors["random/numpy"] = torch.from_numpy(np.asarray(keys).astype(np.int64))
@@ -196,8 +185,8 @@ def _state(
 
 def _start_from(learner: AdaptivePPO, saved: Checkpoint) -> None:
     """Loads only networks and normalizer of a checkpoint into ``learner``."""
-    load_module(saved, learner.policy)
-    with sound(saved.path):
+    run_folder.load_module(saved, learner.policy)
+    with run_folder.sound(saved.path):
         statistics = learner.statistics
         statistics.mean = saved.tensors["normalizer/mean"].numpy()
         statistics.var = saved.tensors["normalizer/variance"].numpy()
@@ -207,8 +196,8 @@ def _start_from(learner: AdaptivePPO, saved: Checkpoint) -> None:
 def _restore(learner: AdaptivePPO, sampler: PlanSampler, saved: Checkpoint) -> None:
     """Restores ``learner`` and ``sampler`` from the checkpoint."""
     _start_from(learner, saved)
-    restore_learning(saved, learner.policy, learner.policy.optimizer)
-    with sound(saved.path):
+    run_folder.restore_learning(saved, learner.policy, learner.policy.optimizer)
+    with run_folder.sound(saved.path):
         for name in _SCORES:
             scores = saved.tensors[f"sampler/{name}"].numpy()
             own = getattr(sampler, name)
