@@ -15,10 +15,10 @@ _PREFIX = "return/"
 
 
 def learning_curve(log: Path, points: int = POINTS) -> dict[str, Any]:
-    """Returns the learning curve of a training log ``progress.jsonl``, at most so long.
+    """Returns the learning curve of a training log, thinned to ``points`` lines.
 
-    It has a line for each batch; the first and the last one are kept. Resumed runs
-    append to the same log; their seconds are summed.
+    The log ``progress.jsonl`` has a line for each batch; the first and the last one are
+    kept. Resumed runs append to the same log; their seconds are summed.
 
     Returns:
         "steps" of the environment and "seconds" of training so far, and under "return"
