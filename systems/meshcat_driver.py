@@ -20,9 +20,14 @@ SLIDERS = (
 HALT = "Halt (Space)"
 RESET_BUTTON = "Put upright (R)"
 STOP = "Stop (Esc)"
+# By how many the gait changes. Digits as keys would act while a slider's number is
+# typed.
+GAIT_STEPS = {"Previous gait (Z)": -1, "Next gait (X)": 1}
 # A push, N s to the left.
 PUSHES = {"Push left (arrow)": 6.0, "Push right (arrow)": -6.0}
 _KEYS = {
+    "Previous gait (Z)": "KeyZ",
+    "Next gait (X)": "KeyX",
     HALT: "Space",
     "Push left (arrow)": "ArrowLeft",
     "Push right (arrow)": "ArrowRight",
@@ -81,21 +86,17 @@ class MeshcatDriver:
         self, meshcat: Meshcat, labels: Sequence[GaitLabel], gait: GaitLabel
     ) -> None:
         self._meshcat = meshcat
-        self._gait = LABELS.index(gait)
+        self._labels, self._gait = labels, labels.index(gait)
         self._pushed = -_PUSH_PAUSE
         self._had_gamepad = False
         #: What was limited or is missing, for the driver to see.
         self.notes: tuple[str, ...] = ()
         for name, low, high, step, down, up in SLIDERS:
             meshcat.AddSlider(name, low, high, step, 0.0, down, up)
-        self._gaits: dict[str, int] = {}
-        for number, label in enumerate(labels, 1):
-            key = f" ({number % 10})" if number <= 10 else ""
-            self._gaits[f"{label}{key}"] = LABELS.index(label)
-            meshcat.AddButton(f"{label}{key}", f"Digit{number % 10}" if key else "")
-        for name, key in _KEYS.items():
+        buttons = {**dict.fromkeys(map(str, labels), ""), **_KEYS}
+        for name, key in buttons.items():
             meshcat.AddButton(name, key)
-        self._clicks = dict.fromkeys((*self._gaits, *_KEYS), 0)
+        self._clicks = dict.fromkeys(buttons, 0)
 
     @property
     def stopped(self) -> bool:
@@ -114,9 +115,12 @@ class MeshcatDriver:
                 self._meshcat.SetSliderValue(name, 0.0)
         orders = np.zeros(ORDERS)
         orders[COMMAND] = self._command()
-        for name in pressed & self._gaits.keys():
-            self._gait = self._gaits[name]
-        orders[GAIT] = self._gait
+        for number, label in enumerate(self._labels):
+            if str(label) in pressed:
+                self._gait = number
+        step = sum(GAIT_STEPS[name] for name in pressed & GAIT_STEPS.keys())
+        self._gait = (self._gait + step) % len(self._labels)
+        orders[GAIT] = LABELS.index(self._labels[self._gait])
         pushes = sorted(pressed & PUSHES.keys())
         if pushes and time >= self._pushed + _PUSH_PAUSE:
             orders[PUSH] = PUSHES[pushes[0]]
@@ -138,7 +142,8 @@ class MeshcatDriver:
         command = np.clip(np.where(np.isfinite(asked), asked, 0.0), low, high)
         if not np.array_equal(command, asked):
             self.notes = (*self.notes, "command limited")
-        return command
+        # Steps of .1 add up to a bit more or less.
+        return np.round(command, 6)
 
     def _gamepad(self) -> Array:
         """Returns what the gamepad commands, 0 without one, shape (3,)."""

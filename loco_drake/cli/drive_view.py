@@ -94,7 +94,8 @@ class DriveView:
         if self._page is not None:
             self._page.show(*lines)
         if self._line is not None:
-            self._line.update(Text("  |  ".join(lines), no_wrap=True), refresh=True)
+            text = Text("  |  ".join(lines), no_wrap=True, overflow="ellipsis")
+            self._line.update(text, refresh=True)
         self._happened = ""
 
     def _lines(self, now: float, orders: Array) -> list[str]:

@@ -2,8 +2,12 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
+from loco_drake.control.driving import OrderTable
 from loco_drake.control.plan import PLAN_DT
+from loco_drake.evaluation.tracking import Recorder
 from loco_drake.systems.command_source import CommandSource
+from loco_drake.systems.scenario import Scenario
+from loco_drake.systems.simulator import MakeSimulator
 
 
 def count(time):
@@ -44,6 +48,27 @@ def test_the_outputs_depend_on_the_context_alone():
     np.testing.assert_array_equal(outputs(source, clone), said[1])
     default = source.CreateDefaultContext()
     np.testing.assert_array_equal(outputs(source, default), 0)
+
+
+def test_a_robot_cloned_in_the_middle_of_a_turn_goes_on_identically():
+    rows = np.zeros((3, 6))
+    rows[:, 0] = 0.6
+    rows[1:, 2] = 0.9, -0.5
+    rows[:, 3] = 1.0
+    table = OrderTable(np.array([0.0, 0.5, 1.1]), rows)
+    recorder = Recorder(Scenario(), source=CommandSource(table.at))
+    recorder.start()
+    recorder.simulator.AdvanceTo(0.83)
+    twin = MakeSimulator(recorder.diagram, Scenario())
+    twin.reset_context(recorder.context.Clone())
+    ends = []
+    for simulator in (recorder.simulator, twin):
+        simulator.AdvanceTo(1.6)
+        state = recorder.diagram.GetOutputPort("state").Eval(simulator.get_context())
+        ends.append(state.copy())
+    np.testing.assert_array_equal(*ends)
+    # It turned to the left before.
+    assert ends[0][3] > 0.05
 
 
 def test_no_zero_is_negative():
