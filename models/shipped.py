@@ -53,3 +53,8 @@ def policy_path(robot: Robot, policy: Path | None = None) -> Path:
             + (f"there are {names}." if names else "there is only the main one.")
         )
     return variants[str(policy)]
+
+
+def results_path(name: str) -> Path:
+    """Returns the path of shipped figures, such as "steering-go2"."""
+    return pretrained_dir() / "results" / f"{name}.json"

@@ -81,6 +81,9 @@ class SteeringConfig:
 
     # Seconds in which the plan covers 90 % of a step of the command.
     response: float = 0.6
+    # Keep commands within the ranges measured for the robot's main policy; otherwise
+    # only within what legs and joints can do.
+    measured_ranges: bool = True
 
     def check(self) -> None:
         """Raises InputError unless every field is valid."""

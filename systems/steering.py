@@ -1,5 +1,6 @@
 """The system that makes a plan go where it is told."""
 
+import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -7,9 +8,12 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context
 
 from loco_drake.common.immutable import Immutable
+from loco_drake.control.command import CommandRange
 from loco_drake.control.plan import Plan, first_change, standing_plan
 from loco_drake.control.steering import Steered, begin, steer
 from loco_drake.models.robots import Robot
+from loco_drake.models.shipped import results_path
+from loco_drake.motion.gaits import parse_label
 
 from .plan_producer import PlanProducer
 from .scenario import SteeringConfig
@@ -28,6 +32,21 @@ class _Course(Immutable):
     command: tuple[float, ...] = ()
 
 
+def command_ranges(robot: Robot) -> dict[int, CommandRange]:
+    """Returns the ranges of commands that are published for ``robot``, by gait.
+
+    They are those of `evaluate steering`; the keys are rows of gaits.ONE_HOT.
+    """
+    path = results_path(f"steering-{robot.name}")
+    if not path.is_file():
+        return {}
+    labels = json.loads(path.read_text())["labels"]
+    return {
+        parse_label(label).index: CommandRange.of_figures(figures["range"])
+        for label, figures in labels.items()
+    }
+
+
 class Steering(PlanProducer):
     """Bends the ground path of a plan until the base moves as commanded.
 
@@ -43,9 +62,10 @@ class Steering(PlanProducer):
         - followed: vector (3,), the command as far as it is followed; m/s, rad/s
 
     H is the base's heading frame. A critically damped filter turns the command into the
-    velocity of the plan, see :mod:`loco_drake.control.steering`. Of a command that legs
-    or joints cannot follow, the largest possible share is followed, which ``followed``
-    tells. Without a command the output is the input itself, and ``followed`` is 0.
+    velocity of the plan, see :mod:`loco_drake.control.steering`. Commands are kept in
+    the range of each gait; of one that legs or joints cannot follow, the largest
+    possible share is followed. ``followed`` tells what remains. Without a command the
+    output is the input itself, and ``followed`` is 0.
 
     The command is sampled every ``UPDATE_PERIOD`` into the state, of which the outputs
     are functions. ``fixed_time`` comes from the smoother; without it the Context's time
@@ -65,6 +85,7 @@ class Steering(PlanProducer):
         self._robot = robot
         self._config = config or SteeringConfig()
         self._config.check()
+        self._ranges = command_ranges(robot) if self._config.measured_ranges else {}
         rest = standing_plan(robot)
         self._plan = self.DeclareAbstractInputPort("plan", Value(rest))
         self._command = self.DeclareVectorInputPort("command", 3)
@@ -109,5 +130,6 @@ class Steering(PlanProducer):
             command,
             fixed,
             self._config.response,
+            self._ranges,
         )
         return _Course(steered.plan, steered, tuple(command))

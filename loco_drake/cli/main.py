@@ -32,6 +32,7 @@ _COMMANDS = {
     "evaluate tokenizer": "measure reconstruction by the tokenizer",
     "evaluate generation": "compare generated with recorded motion",
     "evaluate tracking": "measure how well a policy tracks",
+    "evaluate steering": "measure how well a policy follows commands",
     "report": "write one HTML page of all results",
 }
 # Of most commands the module is called like them, "train_tracker".

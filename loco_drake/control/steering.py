@@ -7,13 +7,13 @@ the base, with an offset that goes smoothly from one foothold to the next. The l
 follow in closed form.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
-from loco_drake.common.arrays import Array, Bools
-from loco_drake.common.errors import InputError
+from loco_drake.common.arrays import Array, Bools, Integers
 from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import (
     angular_velocity,
@@ -24,6 +24,8 @@ from loco_drake.common.rotations import (
     rotate_plane,
     yaw_quat,
 )
+from loco_drake.control.action import GRAVITY
+from loco_drake.control.command import ANY_COMMAND, CommandRange, check_command
 from loco_drake.control.ground_path import (
     filtered,
     ground_pose,
@@ -34,9 +36,6 @@ from loco_drake.control.ground_path import (
 from loco_drake.control.plan import PLAN_DT, Plan, make_plan
 from loco_drake.control.state import JOINTS, ORIENTATION, POSITION
 from loco_drake.models.robots import Robot
-
-# No command beyond these is followed; most gaits end far below.
-MOST_COMMAND = np.array([4.0, 2.0, 4.0])  # m/s, m/s, rad/s
 
 # Samples before touchdown from which a foot's landing no longer changes.
 _LATE = 6
@@ -54,7 +53,7 @@ class Steered(Immutable):
 
     raw: Plan  # the plan before steering
     plan: Plan  # the plan after steering, on the same clock
-    command: Array  # the command, as far as it can be followed, shape (3,)
+    command: Array  # the command of the last gait as far as it is followed, (3,)
     speed: Array  # filtered command, m/s and rad/s, shape (N, 3)
     rate: Array  # time derivative of ``speed``, shape (N, 3)
     pose: Array  # of the base on the ground, x, y, yaw, shape (N, 3)
@@ -83,11 +82,13 @@ def steer(
     command: Array,
     fixed: float,
     response: float,
+    ranges: Mapping[int, CommandRange] | None = None,
 ) -> Steered:
     """Returns ``raw`` steered by a command, continuing ``before``.
 
-    Legs that would have to reach or move farther than they can get the largest share of
-    the command's change that they can follow.
+    Each gait gets the command in its range that is nearest. If legs would still have to
+    reach or move farther than they can, they get the largest share of the change from
+    the motion's own pace that they can follow.
 
     Args:
         robot: the robot.
@@ -97,26 +98,26 @@ def steer(
             heading frame, shape (3,).
         fixed: plan time up to which the plan must not change, s.
         response: time in which 90 % of a step of the command is covered, s.
+        ranges: range of commands of each gait, by its row of gaits.ONE_HOT.
 
     Raises:
         InputError: if a number of the command is not finite.
     """
-    if not np.isfinite(command).all():
-        raise InputError(
-            "A command must be three finite numbers: forward and sideways m/s and yaw "
-            f"rate rad/s; not {', '.join(f'{value:g}' for value in command)}."
-        )
-    command = np.clip(command, -MOST_COMMAND, MOST_COMMAND)
+    check_command(command)
     drop = round((raw.path_time[0] - before.raw.path_time[0]) / PLAN_DT)
     before = _tail(before, drop)
     last = int(np.ceil((fixed - raw.path_time[0]) / PLAN_DT - 1e-6))
     last = min(max(last, 0), len(before.plan) - 1, len(raw) - 1)
     natural = pace(path_velocity(ground_pose(raw.q)))
     now = natural[last:].mean(axis=0)
+    wanted = {
+        label: (ranges or {}).get(label, ANY_COMMAND).clip(command)
+        for label in np.unique(raw.labels[last:]).tolist()
+    }
     best: tuple[float, Steered] | None = None
     for share in _SHARES:
-        wanted = command - (1 - share) * (command - now)
-        bent, excess = _bend(robot, before, raw, natural, wanted, last, response)
+        targets = {k: c - (1 - share) * (c - now) for k, c in wanted.items()}
+        bent, excess = _bend(robot, before, raw, natural, targets, last, response)
         if best is None or excess < best[0]:
             best = excess, bent
         if excess <= 0:
@@ -143,21 +144,22 @@ def _bend(
     before: Steered,
     raw: Plan,
     natural: Array,
-    command: Array,
+    targets: Mapping[int, Array],
     last: int,
     response: float,
 ) -> tuple[Steered, float]:
     """Returns ``raw`` bent after sample ``last``, and by how much legs fall short.
 
-    The latter is positive if a toe misses its place by more than the tolerance or a
-    joint is faster than its limit; the unit is that of these limits.
+    ``targets`` are the commands of the gaits. The shortfall is positive if a toe misses
+    its place by more than the tolerance or a joint is faster than its limit; the unit
+    is that of these limits.
     """
-    count = len(raw) - 1 - last
-    speed, rate = filtered(
-        command, before.speed[last], before.rate[last], response, count
-    )
-    speed = np.concatenate((before.speed[: last + 1], speed))
-    rate = np.concatenate((before.rate[: last + 1], rate))
+    speed, rate = before.speed[: last + 1], before.rate[: last + 1]
+    for label, count in _runs(raw.labels[last + 1 :]):
+        more = filtered(targets[label], speed[-1], rate[-1], response, count)
+        speed, rate = (
+            np.concatenate(ab) for ab in zip((speed, rate), more, strict=True)
+        )
     raw_pose = ground_pose(raw.q)
     change = (speed - natural)[last:]
     velocity = path_velocity(raw_pose[last:]) + (change[:-1] + change[1:]) / 2
@@ -165,11 +167,17 @@ def _bend(
         (before.pose[: last + 1], integrate(before.pose[last], velocity))
     )
     turn = pose[:, 2] - raw_pose[:, 2]
-    carried = pose[:, None, :2] + rotate_plane(
-        raw.p_WF[..., :2] - raw_pose[:, None, :2], turn[:, None]
+    lean = _lean(robot, speed, rate, natural, pose[:, 2])
+    carried = (
+        lean[:, None]
+        + pose[:, None, :2]
+        + rotate_plane(raw.p_WF[..., :2] - raw_pose[:, None, :2], turn[:, None])
     )
     offset = np.stack(
-        [_foot_offset(before, raw, foot, pose, carried, last) for foot in range(4)],
+        [
+            _foot_offset(before, raw, foot, pose, carried, lean, last)
+            for foot in range(4)
+        ],
         axis=1,
     )
     p_WF = raw.p_WF.copy()
@@ -211,11 +219,37 @@ def _bend(
         np.abs(missed).max(initial=0.0) / _REACH_TOLERANCE - 1,
         fast - max(raw_fast, 1.0),
     )
+    command = targets[int(raw.labels[-1])]
     return Steered(raw, plan, command, speed, rate, pose, offset), excess
 
 
+def _runs(labels: Integers) -> Iterator[tuple[int, int]]:
+    """Yields each label and how often it follows itself."""
+    for label, same in groupby(labels.tolist()):
+        yield label, len(list(same))
+
+
+def _lean(robot: Robot, speed: Array, rate: Array, natural: Array, yaw: Array) -> Array:
+    """Returns by how much the feet are displaced in a turn, m in W, shape (N, 2).
+
+    An inverted pendulum that is to accelerate stands beside its foot, by the
+    acceleration times height over gravity. That of the turn alone counts: a change of
+    speed is over before the feet have followed.
+    """
+    centripetal = speed[:, 2] * speed[:, 0] - natural[:, 2] * natural[:, 0]
+    along = -speed[:, 2] * speed[:, 1] + natural[:, 2] * natural[:, 1]
+    inward = np.stack((along, centripetal), axis=-1)
+    return rotate_plane(-robot.stand_height / GRAVITY * inward, yaw)
+
+
 def _foot_offset(
-    before: Steered, raw: Plan, foot: int, pose: Array, carried: Array, last: int
+    before: Steered,
+    raw: Plan,
+    foot: int,
+    pose: Array,
+    carried: Array,
+    lean: Array,
+    last: int,
 ) -> Array:
     """Returns the offset of one foot, unchanged up to sample ``last``, (N, 2)."""
     raw_pose = ground_pose(raw.q)
@@ -248,7 +282,8 @@ def _foot_offset(
             if end == len(toe) - 1 and raw.open_ended:
                 middle = max(middle, start + usual / 2)
             angle = _between(turn[:, None], middle)
-            from_, to = (_between(p[:, :2], middle) for p in (raw_pose, pose))
+            from_ = _between(raw_pose[:, :2], middle)
+            to = _between(pose[:, :2] + lean, middle)
             offset[span] = to + rotate_plane(toe[span] - from_, angle) - carried[span]
             there = rotate_plane(slope_toe[start], angle[0]) - slope_carried[start]
             offset[begun + 1 : start] = _hermite(

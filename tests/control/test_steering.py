@@ -5,9 +5,10 @@ import pytest
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import angular_velocity
+from loco_drake.control.command import ANY_COMMAND, CommandRange
 from loco_drake.control.ground_path import ground_pose, path_velocity
 from loco_drake.control.plan import PLAN_DT, plan_from_motion
-from loco_drake.control.steering import MOST_COMMAND, begin, steer
+from loco_drake.control.steering import begin, steer
 from tests.synthetic_motion import synthetic_motion
 
 COMMANDS = [
@@ -134,8 +135,26 @@ def test_what_legs_cannot_do_is_followed_as_far_as_they_can(go2, trot):
     assert 0.8 < result.command[0] < 3.0
     assert stance_speeds(result.plan).max() < stance_speeds(trot).max() + 0.15
     senseless = steered(go2, trot, (1e9, -1e9, 1e9))
-    assert (np.abs(senseless.command) <= MOST_COMMAND).all()
+    assert (np.abs(senseless.command) <= ANY_COMMAND.high).all()
     assert np.isfinite(senseless.plan.q).all()
+
+
+def test_each_gait_keeps_its_own_range(go2):
+    """A trot may turn; the pace after it may not, and has to go on."""
+    trot = plan_from_motion(go2, synthetic_motion("dog-trot", 4.0, 0.7))
+    labels = trot.labels.copy()
+    labels[100:] = 0
+    both = replace(trot, labels=labels)
+    ranges = {
+        0: CommandRange((0.5, -0.1, -0.0), (1.0, 0.1, 0.0)),
+        1: CommandRange((0.0, -0.3, -1.0), (1.0, 0.3, 1.0)),
+    }
+    command = np.array([0.0, 0.0, 2.0])
+    result = steer(go2, begin(both), both, command, 0.0, 0.4, ranges)
+    velocity = path_velocity(ground_pose(result.plan.q))
+    np.testing.assert_allclose(velocity[60:85].mean(axis=0), [0, 0, 1], atol=0.03)
+    np.testing.assert_allclose(velocity[-50:].mean(axis=0), [0.5, 0, 0], atol=0.03)
+    np.testing.assert_array_equal(result.command, [0.5, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])

@@ -1,0 +1,94 @@
+"""The command ``evaluate steering``."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from loco_drake.cli.evaluation import Evaluation, print_by_label
+from loco_drake.cli.output import tracked
+from loco_drake.motion.gaits import parse_label
+
+if TYPE_CHECKING:
+    from loco_drake.evaluation.steering_table import Course
+    from loco_drake.systems.scenario import Scenario
+
+
+@dataclass(kw_only=True)
+class EvaluateSteering(Evaluation):
+    """Drive the simulated robot by commands and measure how it follows them."""
+
+    # Gait labels, such as dog-trot dog-pace. Default: those that the policy was trained
+    # on.
+    labels: tuple[str, ...] = ()
+    # Number of 60 s drives per label; seeds count up from --seed.
+    seeds: int = 2
+    # Seed of the first drive, and of the generated motion.
+    seed: int = 0
+    # Search for the range of each label; otherwise the published ranges are used.
+    search: bool = False
+    # Weights of the policy, or the name of a shipped variant, such as randomized.
+    # Default: the robot's main policy.
+    policy: Path | None = None
+
+    def of_robots(self, names: list[str]) -> dict[str, Any]:
+        """Returns the figures of one robot, or of all by name.
+
+        Nothing is simulated before it is known that everything can be.
+        """
+        courses = {name: self._courses(name) for name in names}
+        results = {name: self._evaluate(name, *courses[name]) for name in names}
+        return results.get(self.robot, {"robots": results})
+
+    def _courses(self, name: str) -> "tuple[Scenario, list[Course]]":
+        """Returns what to simulate for a robot."""
+        from loco_drake.control.actor import load_actor
+        from loco_drake.evaluation.steering_table import Course
+        from loco_drake.models.robots import get_robot
+        from loco_drake.models.shipped import policy_path
+        from loco_drake.systems.scenario import (
+            GeneratedReference,
+            Scenario,
+            SteeringConfig,
+            TrainedPolicy,
+        )
+        from loco_drake.systems.steering import command_ranges
+
+        robot = get_robot(name)
+        weights = policy_path(robot, self.policy)
+        trained = load_actor(weights, robot).config.labels
+        labels = [parse_label(label) for label in self.labels or trained]
+        scenario = Scenario(
+            robot=name,
+            reference=GeneratedReference(gait=str(labels[0]), duration=60.0),
+            steering=SteeringConfig(measured_ranges=False),
+            policy=TrainedPolicy(weights=weights),
+        )
+        ranges = {} if self.search else command_ranges(robot)
+        seeds = range(self.seed, self.seed + self.seeds)
+        return scenario, [
+            Course(str(label), seeds, ranges.get(label.index)) for label in labels
+        ]
+
+    def _evaluate(
+        self, name: str, scenario: "Scenario", courses: "list[Course]"
+    ) -> dict[str, Any]:
+        from loco_drake.evaluation.steering_table import overall, run_courses
+
+        results = run_courses(scenario, courses, self.workers)
+        labels = dict(tracked(results, f"Driving {name}", len(courses)))
+        return {"robot": name, "labels": labels, "all": overall(labels)}
+
+    def show(self, name: str, figures: dict[str, Any]) -> int:
+        """Prints a table of all labels; returns 0."""
+        rows = {**figures["labels"], "all of these": figures["all"]}
+        print_by_label(f"{name}, steered", ["steering"], rows)
+        ranges = {
+            label: {**of_label, "range": _ends(of_label["range"])}
+            for label, of_label in figures["labels"].items()
+        }
+        print_by_label(f"{name}, ranges of the commands", ["steering_range"], ranges)
+        return 0
+
+
+def _ends(ranges: dict[str, list[float]]) -> dict[str, dict[str, float]]:
+    return {axis: {"low": low, "high": high} for axis, (low, high) in ranges.items()}

@@ -1,0 +1,328 @@
+"""How well a policy follows commands, label by label.
+
+A label's figures are those of :mod:`loco_drake.evaluation.steering`:
+
+* The *range* of a label is a box: an interval of forward and of sideways velocity and
+  of yaw rate. It is searched for along each axis, outward from the gait's own pace and
+  from 0, until the robot falls or the error of a point exceeds its goal; then all of it
+  shrinks until the whole grid keeps the goals without a fall.
+* The *grid* is five values of each axis within the range, one axis at a time with the
+  others at the middle, and the eight corners; 6 s each, of which the last 4 s count.
+* *Steps* go from the middle of the range to both ends of the forward velocity and of
+  the yaw rate, and back.
+* *Drives* are 60 s of commands drawn within the range, another every 2 s.
+"""
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from loco_drake.common.arrays import Array
+from loco_drake.common.parallel import map_in_workers
+from loco_drake.control.command import CommandRange
+from loco_drake.control.ground_path import ground_pose, path_velocity
+from loco_drake.control.plan import PLAN_DT, Plan
+from loco_drake.evaluation.motion_scores import median
+from loco_drake.evaluation.steering import (
+    distance_from_plan,
+    reference_latency,
+    rmse,
+    robot_latency,
+    stride_velocity,
+)
+from loco_drake.evaluation.tracking import (
+    Recorder,
+    Rollout,
+    normalized_return,
+    slip_speeds,
+    stretch,
+)
+from loco_drake.models.robots import get_robot
+from loco_drake.motion.motion import FPS
+from loco_drake.motion.quality import (
+    joint_limit_violations,
+    penetration_max,
+    stance_slip_speeds,
+)
+from loco_drake.systems.scenario import Scenario
+
+VELOCITY_GOAL, YAW_RATE_GOAL = 0.11, 0.12  # m/s, rad/s
+_POINT, _SETTLING = 6.0, 2.0  # s
+_DRIVE, _CHANGE = 60.0, 2.0  # s
+# Distances between the points of the search, and the farthest ones.
+_SEARCH = ((0.25, -1.0, 3.0), (0.1, -0.5, 0.5), (0.25, -1.5, 1.5))
+_SHRINK, _TRIES = 0.85, 8
+# At least so much of an axis is worth a point, m/s or rad/s.
+_LEAST = 0.02
+
+
+@dataclass(frozen=True)
+class Point:
+    """The result of one command."""
+
+    command: Array  # shape (3,)
+    velocities: Array  # over a stride, of the samples that count, shape (N, 3)
+    normalized_return: float
+    fell: bool
+
+    @property
+    def errors(self) -> Array:
+        """Difference of the velocities from the command, shape (N, 3)."""
+        return self.velocities - self.command
+
+    @property
+    def velocity(self) -> list[float] | None:
+        """Mean velocity, shape (3,), or None if the robot fell before it counts."""
+        if not len(self.velocities):
+            return None
+        mean: list[float] = self.velocities.mean(axis=0).tolist()
+        return mean
+
+    @property
+    def is_good(self) -> bool:
+        """Whether the robot stands and keeps the goals."""
+        if self.fell:
+            return False
+        velocity, yaw_rate = rmse([self.errors])
+        return velocity <= VELOCITY_GOAL and yaw_rate <= YAW_RATE_GOAL
+
+
+@dataclass(frozen=True)
+class Course:
+    """What to measure of a label."""
+
+    label: str
+    seeds: Sequence[int]  # of the drives; the first is that of the rest
+    range: CommandRange | None = None  # None to search for it
+
+
+class _Driver:
+    """Measures one label after the other in one diagram."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._robot = get_robot(scenario.robot)
+        self._recorder = Recorder(scenario)
+        self._command = self._recorder.diagram.GetInputPort("command")
+        self._plan = self._recorder.diagram.GetOutputPort("plan")
+
+    def __call__(self, course: Course) -> dict[str, Any]:
+        seed = course.seeds[0]
+        within = course.range or self._search(course.label, seed)
+        points = [self._point(course.label, c, seed) for c in grid(within)]
+        for _ in range(_TRIES if course.range is None else 0):
+            velocity, yaw_rate = rmse([p.errors for p in points])
+            good = velocity <= VELOCITY_GOAL and yaw_rate <= YAW_RATE_GOAL
+            if good and not any(p.fell for p in points):
+                break
+            within = within.scaled(_SHRINK)
+            points = [self._point(course.label, c, seed) for c in grid(within)]
+        velocity, yaw_rate = rmse([p.errors for p in points])
+        return {
+            "range": within.figures(),
+            "velocity_rmse_mps": velocity,
+            "yaw_rate_rmse_radps": yaw_rate,
+            "grid_return": float(np.mean([p.normalized_return for p in points])),
+            "grid_falls": float(np.mean([p.fell for p in points])),
+            "points": [
+                {
+                    "command": p.command.tolist(),
+                    "velocity": p.velocity,
+                    "normalized_return": p.normalized_return,
+                    "fell": p.fell,
+                }
+                for p in points
+            ],
+            **self._steps(course.label, within, seed),
+            **self._drives(course.label, within, course.seeds),
+        }
+
+    def _search(self, label: str, seed: int) -> CommandRange:
+        pace = self._pace(label, seed)
+        low, high = pace * [1.0, 0.0, 0.0], pace * [1.0, 0.0, 0.0]
+        for axis, (step, least, most) in enumerate(_SEARCH):
+            middle = (low + high) / 2
+            multiples = np.arange(np.ceil(least / step), most / step + 1e-9) * step
+            below = [x for x in multiples[::-1] if x < middle[axis]]
+            above = [x for x in multiples if x > middle[axis]]
+            for values, end in ((below, low), (above, high)):
+                for value in values:
+                    command = middle.copy()
+                    command[axis] = value
+                    if not self._point(label, command, seed).is_good:
+                        break
+                    end[axis] = value
+        return CommandRange(tuple(low.tolist()), tuple(high.tolist()))
+
+    def _pace(self, label: str, seed: int) -> Array:
+        """Returns the mean velocity of the gait's plan without a command, (3,)."""
+        self._recorder.start(gait=label, seed=seed)
+        reference = self._recorder.diagram.GetSubsystemByName("reference")
+        plan = reference.GetOutputPort("plan").Eval(
+            reference.GetMyContextFromRoot(self._recorder.context)
+        )
+        mean: Array = path_velocity(ground_pose(plan.q)).mean(axis=0)
+        return mean
+
+    def _run(
+        self,
+        label: str,
+        seed: int,
+        duration: float,
+        command: Callable[[int], Array],
+        plans: list[Plan] | None = None,
+    ) -> Rollout:
+        """Simulates a command that is a function of the sample."""
+        self._recorder.start(gait=label, seed=seed)
+        context = self._recorder.context
+
+        def after_step(time: float) -> None:
+            self._command.FixValue(context, command(round(time / PLAN_DT)))
+            if plans is not None:
+                plans.append(self._plan.Eval(context))
+
+        after_step(0.0)
+        rollout, _ = self._recorder.run(duration, after_step)
+        return rollout
+
+    def _point(self, label: str, command: Array, seed: int) -> Point:
+        rollout = self._run(label, seed, _POINT, lambda _: command)
+        counted = round(_SETTLING / PLAN_DT)
+        velocity = stride_velocity(self._robot, rollout.state)[counted:]
+        return Point(command, velocity, normalized_return(rollout), rollout.fell)
+
+    def _steps(self, label: str, within: CommandRange, seed: int) -> dict[str, Any]:
+        changed = round(_POINT / 2 / PLAN_DT)
+        reference: list[float | None] = []
+        robot: list[float | None] = []
+        for before, after in steps(within):
+            plans: list[Plan] = []
+            rollout = self._run(
+                label, seed, _POINT, partial(_step, before, after, changed), plans
+            )
+            reference.append(reference_latency(plans, changed))
+            velocity = stride_velocity(self._robot, rollout.state)
+            robot.append(
+                None
+                if rollout.fell
+                else robot_latency(velocity, before, after, changed)
+            )
+        known = [latency for latency in robot if latency is not None]
+        return {
+            "latency_reference_s": max(filter(None, reference), default=None),
+            "latency_robot_s": float(np.median(known)) if known else None,
+            "steps": len(robot),
+            "steps_covered": len(known),
+        }
+
+    def _drives(
+        self, label: str, within: CommandRange, seeds: Sequence[int]
+    ) -> dict[str, Any]:
+        drives = []
+        for seed in seeds:
+            random = np.random.default_rng(seed)
+            table = random.uniform(
+                within.low, within.high, (round(_DRIVE / _CHANGE) + 1, 3)
+            )
+            plans: list[Plan] = []
+            command = partial(_from_table, table, round(_CHANGE / PLAN_DT))
+            rollout = self._run(label, seed, _DRIVE, command, plans)
+            drives.append((rollout, plans))
+        p_WF = [
+            np.array([p.p_WF[p.index(k * PLAN_DT)] for k, p in enumerate(plans)])
+            for _, plans in drives
+        ]
+        radius = self._robot.foot_radius
+        plan_slip = np.concatenate([stance_slip_speeds(p, radius, FPS) for p in p_WF])
+        slip = np.concatenate([slip_speeds(r, self._robot) for r, _ in drives])
+        rollouts = [rollout for rollout, _ in drives]
+        return {
+            "fall_rate": float(np.mean([r.fell for r in rollouts])),
+            "normalized_return": float(
+                np.mean([normalized_return(r) for r in rollouts])
+            ),
+            "distance_from_plan_max_m": max(
+                distance_from_plan(r.state, r.plan_state) for r in rollouts
+            ),
+            "stance_slip_median_mps": median(slip),
+            "plan_slip_median_mps": median(plan_slip),
+            "plan_penetration_max_m": max(penetration_max(p, radius) for p in p_WF),
+            "plan_joint_limit_violations": sum(
+                joint_limit_violations(r.plan_state[:, 7:19], self._robot)
+                for r in rollouts
+            ),
+            "stretch": float(np.mean([stretch(r) for r in rollouts])),
+            "drives": len(drives),
+        }
+
+
+def grid(within: CommandRange) -> list[Array]:
+    """Returns the commands of the grid: the middle, points on the axes, the corners."""
+    low, high, middle = np.array(within.low), np.array(within.high), within.middle
+    wide = high - low > _LEAST
+    points = [middle]
+    for axis in np.flatnonzero(wide):
+        for share in (0.0, 0.25, 0.75, 1.0):
+            point = middle.copy()
+            point[axis] = low[axis] + share * (high[axis] - low[axis])
+            points.append(point)
+    sides = [
+        (low[axis], high[axis]) if wide[axis] else (middle[axis],) for axis in range(3)
+    ]
+    return points + [np.array(corner) for corner in itertools.product(*sides)]
+
+
+def steps(within: CommandRange) -> Iterator[tuple[Array, Array]]:
+    """Yields the commands before and after each step."""
+    middle = within.middle
+    for axis, end in itertools.product((0, 2), (within.low, within.high)):
+        there = middle.copy()
+        there[axis] = end[axis]
+        if abs(there[axis] - middle[axis]) >= _LEAST:
+            yield middle, there
+            yield there, middle
+
+
+def _step(before: Array, after: Array, changed: int, sample: int) -> Array:
+    return before if sample < changed else after
+
+
+def _from_table(table: Array, period: int, sample: int) -> Array:
+    row: Array = table[sample // period]
+    return row
+
+
+def run_courses(
+    scenario: Scenario, courses: Sequence[Course], workers: int = 1
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yields label and figures of each course, in order."""
+    results = map_in_workers(partial(_Driver, scenario), courses, workers)
+    return zip((course.label for course in courses), results, strict=True)
+
+
+def overall(labels: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """Returns the figures of all labels together."""
+
+    def of(name: str) -> list[float]:
+        return [f[name] for f in labels.values() if f[name] is not None]
+
+    weights = np.array([len(figures["points"]) for figures in labels.values()])
+    result: dict[str, Any] = {
+        name: float(np.sqrt(np.square(of(name)) @ weights / weights.sum()))
+        for name in ("velocity_rmse_mps", "yaw_rate_rmse_radps")
+    }
+    for name in (
+        "latency_reference_s",
+        "distance_from_plan_max_m",
+        "plan_penetration_max_m",
+    ):
+        result[name] = max(of(name), default=None)
+    for name in ("latency_robot_s", "plan_slip_median_mps", "stance_slip_median_mps"):
+        result[name] = float(np.median(of(name))) if of(name) else None
+    for name in ("fall_rate", "normalized_return", "stretch"):
+        result[name] = float(np.mean(of(name)))
+    result["plan_joint_limit_violations"] = sum(of("plan_joint_limit_violations"))
+    return result
