@@ -109,7 +109,7 @@ def test_a_new_command_keeps_what_is_fixed_and_goes_on_smoothly(go2, trot):
     assert (second.plan.q[fixed] != first.plan.q[fixed]).any()
     # It leaves the old plan as smoothly as its filter does.
     apart = np.abs(second.plan.q - first.plan.q)[fixed : fixed + 4]
-    assert apart[0].max() < 6e-3
+    assert apart[0].max() < 0.01
     assert apart[3].max() < 0.1
     assert stance_speeds(second.plan).max() < stance_speeds(trot).max() + 2e-3
     velocity = path_velocity(ground_pose(second.plan.q))[-50:]
