@@ -53,7 +53,7 @@ class CommandRange:
 ANY_COMMAND = CommandRange((-4.0, -2.0, -4.0), (4.0, 2.0, 4.0))
 
 
-def check_command(command: Array) -> None:
+def check_finite(command: Array) -> None:
     """Raises InputError unless the command (3,) is finite."""
     if not np.isfinite(command).all():
         raise InputError(

@@ -18,8 +18,8 @@ import numpy as np
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, check_number, quoted
 from loco_drake.common.files import read_text
+from loco_drake.control.command import ANY_COMMAND
 from loco_drake.control.plan import PLAN_DT
-from loco_drake.control.steering import MOST_COMMAND
 from loco_drake.motion.gaits import LABELS, parse_label
 
 COMMAND = np.s_[..., :3]
@@ -59,11 +59,11 @@ def check_command(command: Sequence[float]) -> Array:
     """Returns a command as an array, shape (3,).
 
     Raises:
-        InputError: if a number is not finite or beyond MOST_COMMAND.
+        InputError: if a number is not finite or beyond ANY_COMMAND.
     """
-    for name, value, most in zip(_NEEDED[1:], command, MOST_COMMAND, strict=True):
+    for name, value, most in zip(_NEEDED[1:], command, ANY_COMMAND.high, strict=True):
         what = f"A command's {name.replace('_', ' ')}"
-        check_number(what, value, -float(most), float(most))
+        check_number(what, value, -most, most)
     return np.array(command, dtype=np.float64)
 
 

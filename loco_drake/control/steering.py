@@ -25,7 +25,7 @@ from loco_drake.common.rotations import (
     yaw_quat,
 )
 from loco_drake.control.action import GRAVITY
-from loco_drake.control.command import ANY_COMMAND, CommandRange, check_command
+from loco_drake.control.command import ANY_COMMAND, CommandRange, check_finite
 from loco_drake.control.ground_path import (
     filtered,
     ground_pose,
@@ -103,7 +103,7 @@ def steer(
     Raises:
         InputError: if a number of the command is not finite.
     """
-    check_command(command)
+    check_finite(command)
     drop = round((raw.path_time[0] - before.raw.path_time[0]) / PLAN_DT)
     before = _tail(before, drop)
     last = int(np.ceil((fixed - raw.path_time[0]) / PLAN_DT - 1e-6))
