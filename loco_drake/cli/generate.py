@@ -34,6 +34,9 @@ class Generate:
     # Speed rank, from 0 (slowest recorded speed of the gait) to 1 (fastest). Default:
     # drawn for each seed.
     pace: float | None = None
+    # Steer each motion by commands drawn every 2 s: along another path, sideways,
+    # faster, slower and backwards, see docs/driving.md.
+    steer: bool = False
     # Sampling temperature: above 1 more varied, below 1 more typical, 0 greedy.
     temperature: float = 1.0
     # Sample from the likeliest codes that together have this probability.
@@ -44,6 +47,7 @@ class Generate:
 
     def run(self) -> int:
         """Writes the files and prints the figures; returns 0."""
+        from loco_drake.control.steered_motion import steered_motion
         from loco_drake.generation import generate
         from loco_drake.generation.motion_model import load_motion_model
         from loco_drake.models.robots import ROBOTS
@@ -76,6 +80,8 @@ class Generate:
             )
             seconds += time.perf_counter() - start
             for seed, motion in zip(seeds, motions, strict=True):
+                if self.steer:
+                    motion = steered_motion(model.robot, motion, seed)
                 save_motion(motion, self.out / f"{schedule}-{seed}.npz")
                 frames += len(motion)
         figures = {

@@ -58,6 +58,10 @@ class Retarget:
     # Number of 2 s trajectories for each of the fifteen labels, at most; 0 for none.
     # None are cut with FILE.
     trajectories: int = 10
+    # Number of steered variants to write of each stretch, besides itself: along other
+    # paths, sideways, faster, slower and backwards, see docs/driving.md. None of a
+    # stretch that is held out for validation.
+    steer: int = 0
     # Number of worker processes.
     workers: int = 1
     data_dir: DataDir = None
@@ -74,12 +78,16 @@ class Retarget:
         """
         from loco_drake.datasets.registry import DATASETS
         from loco_drake.models.robot_files import load_robot
+        from loco_drake.models.robots import ROBOTS
         from loco_drake.retargeting.retarget import retarget_segments
         from loco_drake.retargeting.scaling import Variant
 
         robot = load_robot(self.robot)
         check_at_least("trajectories", self.trajectories, 0)
         check_at_least("workers", self.workers, 1)
+        check_at_least("steer", self.steer, 0)
+        if self.steer:
+            check_choice("robot to steer", robot.name, ROBOTS)
         if self.source is not None:
             check_choice("source", self.source, DATASETS)
         segments, split = self._segments()
@@ -97,10 +105,34 @@ class Retarget:
         title = f"Motion files in {out}: {len(rows)}{', mirrored' * self.mirror}"
         print_table(title, ["clip", *_COLUMNS], rows)
         output.print_warnings(doubtful)
+        self._steer(robot.name, outcomes, split)
         if split is not None and self.trajectories:
             self._cut(outcomes, split, out.parent / f"{out.name}-trajectories")
         output.print_failed((o.segment.name, str(o.error)) for o in failed)
         return 1 if failed or (self.strict and doubtful) else 0
+
+    def _steer(
+        self, robot: str, outcomes: "list[Outcome]", split: "Split | None"
+    ) -> None:
+        """Writes the steered variants."""
+        from loco_drake.control.steered_motion import steered_motion
+        from loco_drake.datasets.split import VALIDATION
+        from loco_drake.models.robots import get_robot
+        from loco_drake.motion.motion_file import load_motion, save_motion
+
+        written = 0
+        for number, outcome in enumerate(outcomes if self.steer else []):
+            held_out = split is not None and split.side(outcome.segment) == VALIDATION
+            if outcome.error is not None or held_out:
+                continue
+            motion = load_motion(outcome.path)
+            for k in range(self.steer):
+                seed = (self.seed, number, k)
+                path = outcome.path.with_stem(f"{outcome.path.stem}-steered{k}")
+                save_motion(steered_motion(get_robot(robot), motion, seed), path)
+                written += 1
+        if self.steer:
+            print(f"Steered variants: {written}.")
 
     def _cut(self, outcomes: "list[Outcome]", split: "Split", folder: Path) -> None:
         from loco_drake.datasets.split import TRAIN, VALIDATION

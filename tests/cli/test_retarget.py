@@ -65,6 +65,31 @@ def test_files_tell_their_side_and_trajectories_are_cut(made_data, tmp_path, cap
     assert not (tmp_path / "a-trajectories").exists()
 
 
+def test_steered_variants_are_written_but_not_of_validation(
+    made_data, tmp_path, capsys
+):
+    out = tmp_path / "out"
+    arguments = ("--data-dir", made_data, "--out", out, "--trajectories", "0")
+    assert (
+        command(*arguments, "--gait", "pace", "--gait", "trot", "--steer", "2").run()
+        == 0
+    )
+    plain = [path for path in out.glob("*.npz") if "steered" not in path.stem]
+    sides = {path: load_motion(path).provenance["split"] for path in plain}
+    for path, side in sides.items():
+        variants = sorted(out.glob(f"{path.stem}-steered*.npz"))
+        assert len(variants) == (0 if side == "validation" else 2)
+        for variant in variants:
+            steered = load_motion(variant)
+            assert steered.provenance["split"] == side
+            assert "m/s forward" in steered.provenance["steered_by"]
+    count = 2 * sum(side != "validation" for side in sides.values())
+    assert count > 0
+    assert f"Steered variants: {count}." in capsys.readouterr().out
+    with pytest.raises(InputError, match="the choices are go2, a1"):
+        command(*arguments, "--robot", SOLO8, "--steer", "1").run()
+
+
 def test_one_file_with_a_stretch_for_the_a1(made_data, tmp_path):
     file = made_data / "dog_mann" / "keypoints" / "made_trot.txt"
     options = ("--source", "dog", "--gait", "trot", "--robot", "a1", "--start", 60)
