@@ -10,6 +10,8 @@ import numpy as np
 
 Random = np.random.Generator
 
+CHECKSUM = "content_sha256"  # name of the field, in files of every kind
+
 
 @dataclass(frozen=True)
 class Damage:
@@ -20,6 +22,7 @@ class Damage:
         data: its bytes now.
         place: puts something else at its path, instead of a file with ``data``.
         legal: whether the file is another, but sound: nobody can tell.
+        near: whether what comes of it must be near what comes of the sound file.
         name: of the file, where that is what is wrong.
     """
 
@@ -27,6 +30,7 @@ class Damage:
     data: bytes = b""
     place: Callable[[Path], None] | None = field(default=None, compare=False)
     legal: bool = False
+    near: bool = False
     name: str | None = None
 
 

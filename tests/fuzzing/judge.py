@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from tests.fuzzing.damage import Damage
 from tests.fuzzing.kinds import Kind
 from tests.fuzzing.worker import MEMORY, TRACEBACK, Run
 
@@ -19,6 +20,7 @@ Files = dict[str, tuple[str, ...]]
 
 BEFORE = b"was there before\n"  # in outputs, before the command runs
 LONGEST = 1000  # letters of a line
+NEAR = 0.05  # of the highest value of a leaf
 _CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\ufffd]")
 ABSOLUTE = (Path("/tmp/loco_drake_canary"), Path("/tmp/loco_drake_canary.npy"))
 _SKIPPED = ("provenance", "path", "content_hash")
@@ -97,7 +99,7 @@ def _same(a: Any, b: Any) -> bool:
 
 
 def judge(
-    values: bool,
+    damage: Damage,
     kind: Kind,
     run: Run,
     clean: Run,
@@ -108,7 +110,7 @@ def judge(
     """Returns the verdict on a run and the reason if it is "BAD".
 
     Args:
-        values: whether it may lead to something else without a word.
+        damage: to the input.
         kind: of the input.
         run: what became of the command.
         clean: of the command with the sound input.
@@ -133,7 +135,9 @@ def judge(
     if _said(run) - _said(clean):
         return "mended", ""
     gross = _gross(sound, own)
-    if values and not gross:
+    if damage.near and not gross:
+        gross = _far(sound, own, changed)
+    if (kind.values or damage.legal or damage.near) and not gross:
         return "other value", ""
     return "BAD", f"silent change: {gross or ', '.join(changed)[:300]}"
 
@@ -191,6 +195,19 @@ def _what_it_wrote(kind: Kind, status: int | None, before: Files, after: Files) 
         return f"refused, but changed {', '.join(sorted(changed))[:300]}"
     if status == 1 and changed and not kind.partial:
         return f"failed, but changed {', '.join(sorted(changed))[:300]}"
+    return ""
+
+
+def _far(sound: Leaves, own: Leaves, changed: list[str]) -> str:
+    """Returns what of an outcome is not near the sound one; empty if all is."""
+    for name in changed:
+        one, other = sound.get(name), own.get(name)
+        numbers = (int, float, np.ndarray)
+        if not isinstance(one, numbers) or not isinstance(other, numbers):
+            return f"{name} is {other}, not {one}"
+        off = np.abs(np.subtract(other, one, dtype=float)).max()
+        if off > NEAR * np.abs(one).max() + 1e-3:
+            return f"{name} is {off:.3g} from that of the sound input"
     return ""
 
 

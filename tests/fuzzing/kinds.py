@@ -1,17 +1,12 @@
 """The kinds of files that are damaged: how each is made, read and damaged."""
 
-import csv
-import hashlib
-import json
-import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tests.fuzzing import archives, text
+from tests.fuzzing import drives, formats, makers, motions, text, weights
 from tests.fuzzing.damage import Damage, Random, damage_bytes, hand_made
-
-Damages = Callable[[bytes, Random], Iterator[Damage]]
+from tests.fuzzing.formats import Damages
 
 
 @dataclass(frozen=True)
@@ -46,203 +41,15 @@ class Kind:
     values: bool = False
 
 
-def _table(separator: str, header: int) -> Damages:
-    def damages(data: bytes, random: Random) -> Iterator[Damage]:
-        for _ in range(2):
-            yield from text.tables(data.decode(), separator, header, random)
-        yield from text.encodings(data.decode())
-
-    return damages
-
-
-def _of(*parts: Callable[[str, Random], Iterator[Damage]]) -> Damages:
-    def damages(data: bytes, random: Random) -> Iterator[Damage]:
-        for part in parts:
-            yield from part(data.decode(), random)
-        yield from text.encodings(data.decode())
-
-    return damages
-
-
-def _json(data: bytes, random: Random) -> Iterator[Damage]:
-    yield from text.json_texts(json.loads(data), 250, random)
-    yield from text.encodings(data.decode())
-
-
-def _lines(data: bytes, random: Random) -> Iterator[Damage]:
-    rows = data.decode().splitlines()
-    for damage in text.json_texts(json.loads(rows[-1]), 80, random):
-        body = b"\n".join([*(row.encode() for row in rows[:-1]), damage.data]) + b"\n"
-        yield Damage(f"last line: {damage.what}", body)
-    yield from text.encodings(data.decode())
-
-
-def _motion(
-    folder: Path,
-    name: str = "motion.npz",
-    label: str = "dog-trot",
-    seconds: float = 1.0,
-) -> None:
-    from loco_drake.motion.motion_file import save_motion
-    from tests.synthetic_motion import synthetic_motion
-
-    save_motion(synthetic_motion(label, seconds), folder / name)
-
-
-def _policy(folder: Path) -> None:
-    from loco_drake.models.shipped import pretrained_path
-
-    _motion(folder)
-    shutil.copy(pretrained_path("policy_go2"), folder / "policy.safetensors")
-
-
-def _model(folder: Path) -> None:
-    from loco_drake.common.weights import save_network
-    from tests.tiny_model import make_tiny_model
-
-    model = make_tiny_model()
-    save_network(
-        folder / "tokenizer.safetensors", "tokenizer", model.tokenizer, half=True
-    )
-    save_network(
-        folder / "generator.safetensors", "generator", model.generator, half=True
-    )
-
-
-def _references(folder: Path) -> None:
-    for label in ("dog-trot", "dog-pace"):
-        _motion(folder, f"motions/{label}.npz", label, 2.0)
-
-
-def _run(folder: Path, *command: str) -> None:
-    """Makes what a training leaves, by the command itself."""
-    from tests.fuzzing.worker import Worker
-
-    worker = Worker()
-    run = worker.run(list(command), folder, seconds=200.0)
-    worker.close()
-    assert run.status == 0, run.stderr
-
-
-_TOKENIZER = "train tokenizer --motions motions --steps 2 --out out/run"
-_TRACKER = (
-    "train tracker --references motions --steps 64 --batch 32 --workers 1 "
-    "--per-worker 2 --out out/run --json out/figures.json"
-)
-
-
-def _tokenizer_run(folder: Path) -> None:
-    _references(folder)
-    _run(folder, *_TOKENIZER.split())
-
-
-def _tracker_run(folder: Path) -> None:
-    _references(folder)
-    _run(folder, *_TRACKER.split())
-    shutil.copy(folder / "out/run/checkpoint.safetensors", folder)
-
-
-def _start(folder: Path) -> None:
-    _tracker_run(folder)
-    shutil.rmtree(folder / "out")
-
-
-def _recording(form: str) -> Callable[[Path], None]:
-    def make(folder: Path) -> None:
-        from tests import synthetic, synthetic_bvh, synthetic_horse, synthetic_robots
-
-        path = folder / RECORDINGS[form][0]
-        match form:
-            case "dog":
-                synthetic.write_dog_recording(path, "trot", seconds=2.0)
-            case "dog BVH":
-                synthetic_bvh.write_dog_bvh(path, "trot", seconds=1.5)
-            case "horse":
-                horse = synthetic_horse.make_horse("trot", 60.0, 3.0)
-                synthetic_horse.write_world_recording(path, horse)
-            case "horse, raw":
-                horse = synthetic_horse.make_horse("walk", 60.0, 4.0)
-                synthetic_horse.write_raw_recording(path, horse)
-            case "mpc":
-                synthetic_robots.write_mpc_recording(path, "trot", seconds=2.0)
-            case "solo8":
-                synthetic_robots.write_solo8_recording(path)
-
-    return make
-
-
 # File, source, gait, and how its numbers are written.
 RECORDINGS = {
-    "dog": ("dog.txt", "dog", "trot", _table(",", 0)),
-    "dog BVH": ("dog.bvh", "dog", "trot", None),
-    "horse": ("horse.csv", "horse", "trot", _table(",", 0)),
-    "horse, raw": ("raw.csv", "horse", "walk", _table(",", 1)),
-    "mpc": ("mpc.txt", "mpc", "trot", _table(",", 0)),
-    "solo8": ("solo8.txt", "solo8", "wave", _table(",", 0)),
+    "dog": ("dog.txt", "dog", "trot", formats.table(",", 0)),
+    "dog BVH": ("dog.bvh", "dog", "trot", formats.bvh),
+    "horse": ("horse.csv", "horse", "trot", formats.table(",", 0)),
+    "horse, raw": ("raw.csv", "horse", "walk", formats.table(",", 1)),
+    "mpc": ("mpc.txt", "mpc", "trot", formats.table(",", 0)),
+    "solo8": ("solo8.txt", "solo8", "wave", formats.table(",", 0)),
 }
-
-
-def _bvh(data: bytes, random: Random) -> Iterator[Damage]:
-    lines = data.decode().splitlines()
-    head = next(k for k, line in enumerate(lines) if line.startswith("Frame Time")) + 1
-    yield from text.tables(data.decode(), " ", head, random)
-    yield from text.encodings(data.decode())
-    words = (
-        "",
-        "nan",
-        "-1",
-        "1e300",
-        "0",
-        "1e9",
-        "x" * 10_000,
-        "ROOT",
-        "End",
-        "{",
-        "6",
-    )
-    words += ("}", "Xposition", "a\nb", "\x1b[31m", "3.7", "16.6667", "٣")
-    places = [
-        (k, n) for k, line in enumerate(lines[:head]) for n in range(len(line.split()))
-    ]
-    for k in random.permutation(len(places) * len(words))[:200]:
-        (row, column), word = places[k // len(words)], words[k % len(words)]
-        cells = lines[row].split()
-        old, cells[column] = cells[column], word
-        new = [*lines[:row], " ".join(cells), *lines[row + 1 :]]
-        what = f"line {row + 1}: {old} is {word[:20]!a}"
-        yield Damage(what, ("\n".join(new) + "\n").encode())
-    for k in random.permutation(head)[:25]:
-        gone, twice = lines[:k] + lines[k + 1 :], lines[: k + 1] + lines[k:]
-        yield Damage(f"line {k + 1} missing", ("\n".join(gone) + "\n").encode())
-        yield Damage(f"line {k + 1} twice", ("\n".join(twice) + "\n").encode())
-    deep = "HIERARCHY\nROOT a\n" + "{\nJOINT a\n" * 20_000
-    yield Damage("deep", deep.encode())
-
-
-def _data(folder: Path) -> None:
-    from tests.synthetic import write_data_folder
-
-    write_data_folder(folder / "data", ("pace", "trot"), 2.0)
-
-
-def _mirror(folder: Path) -> None:
-    from tests.synthetic import write_data_folder
-
-    mirror = write_data_folder(folder / "mirror", ("pace", "trot"), 1.0)
-    rows = [["file", "repository", "commit", "path", "bytes", "sha256"]]
-    for path in sorted(mirror.rglob("*.txt")):
-        content = path.read_bytes()
-        name = path.relative_to(mirror).as_posix()
-        checksum = hashlib.sha256(content).hexdigest()
-        rows.append([name, "owner/name", "0" * 40, name, str(len(content)), checksum])
-    with (folder / "manifest.csv").open("w", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows(rows)
-    shutil.copy(mirror / "segments.csv", folder / "shipped.csv")
-
-
-def _fetched(folder: Path) -> None:
-    _mirror(folder)
-    shutil.copytree(folder / "mirror", folder / "out/data")
 
 
 _FETCH = "data fetch --mirror mirror --data-dir out/data --json out/figures.json"
@@ -252,57 +59,24 @@ _FETCH_PATCHES = {
 }
 
 
-def _robot(folder: Path) -> None:
-    from tests.made_inputs import robot_yaml, urdf
-
-    _recording("dog")(folder)
-    (folder / "robot.urdf").write_text(urdf())
-    (folder / "robot.yaml").write_text(robot_yaml("robot.urdf"))
-
-
-def _sources(folder: Path) -> None:
-    from loco_drake.retargeting import scaling
-
-    _recording("dog")(folder)
-    shutil.copytree(Path(scaling.__file__).parent / "sources", folder / "sources")
-
-
-def _result(name: str) -> Callable[[Path], None]:
-    def make(folder: Path) -> None:
-        from loco_drake.models.shipped import pretrained_dir
-
-        (folder / "results").mkdir()
-        shutil.copy(pretrained_dir() / "results" / f"{name}.json", folder / "results")
-
-    return make
-
-
-def _scenario(folder: Path) -> None:
-    _motion(folder)
-    (folder / "scenario.yaml").write_text(
-        "robot: go2\n"
-        "plant: {contact: similar, time_step: 0.01, friction: 0.8}\n"
-        "reference: !MotionReference {path: motion.npz}\n"
-        "policy: !TrainedPolicy {}\n"
-    )
-
-
 def _kinds() -> Iterator[Kind]:
     simulate = "simulate --no-meshcat --duration 0.06 --json out/figures.json"
+    # All that the motion holds.
+    simulate_all = simulate.replace("0.06", "1.0")
     yield Kind(
         "Motion, simulated",
         "motion.npz",
-        f"{simulate} --reference {{target}}",
-        _motion,
-        archives.npz_files,
+        f"{simulate_all} --reference {{target}}",
+        makers.motion,
+        motions.npz_files,
         share=5.0,
     )
     yield Kind(
         "Motion, trained on",
         "motions/dog-trot.npz",
-        _TOKENIZER,
-        _references,
-        archives.npz_files,
+        makers.TOKENIZER,
+        makers.references,
+        motions.npz_files,
         share=1.0,
         named=False,
     )
@@ -310,8 +84,8 @@ def _kinds() -> Iterator[Kind]:
         "policy",
         "policy.safetensors",
         f"{simulate} --reference motion.npz --policy {{target}}",
-        _policy,
-        archives.safetensors_files,
+        makers.policy,
+        weights.safetensors_files,
         share=2.0,
     )
     generate = (
@@ -326,36 +100,36 @@ def _kinds() -> Iterator[Kind]:
             name,
             f"{name}.safetensors",
             generate.format(*files),
-            _model,
-            archives.safetensors_files,
+            makers.model,
+            weights.safetensors_files,
             share=2.0,
         )
     yield Kind(
         "checkpoint of a tokenizer",
         "out/run/checkpoint.safetensors",
-        f"{_TOKENIZER} --resume",
-        _tokenizer_run,
-        archives.safetensors_files,
+        f"{makers.TOKENIZER} --resume",
+        makers.tokenizer_run,
+        weights.safetensors_files,
         named=False,
         in_place=True,
     )
     yield Kind(
         "checkpoint of a tracker",
         "out/run/checkpoint.safetensors",
-        f"{_TRACKER} --resume",
-        _tracker_run,
-        archives.safetensors_files,
-        share=0.2,
+        f"{makers.TRACKER} --resume",
+        makers.tracker_run,
+        weights.safetensors_files,
+        share=0.8,
         named=False,
         in_place=True,
     )
     yield Kind(
         "log of a tracker",
         "out/run/progress.jsonl",
-        f"{_TRACKER} --resume",
-        _tracker_run,
-        _lines,
-        share=0.1,
+        f"{makers.TRACKER} --resume",
+        makers.tracker_run,
+        formats.last_line,
+        share=0.8,
         named=False,
         in_place=True,
         values=True,
@@ -363,10 +137,10 @@ def _kinds() -> Iterator[Kind]:
     yield Kind(
         "checkpoint to start from",
         "checkpoint.safetensors",
-        f"{_TRACKER} --start-from {{target}}",
-        _start,
-        archives.safetensors_files,
-        share=0.2,
+        f"{makers.TRACKER} --start-from {{target}}",
+        makers.start,
+        weights.safetensors_files,
+        share=0.8,
     )
     for form, (file, source, gait, damages) in RECORDINGS.items():
         options = f"--source {source} --json out/figures.json"
@@ -378,8 +152,8 @@ def _kinds() -> Iterator[Kind]:
                 f"{form}, {name}",
                 file,
                 f"{command} {options} {{target}}",
-                _recording(form),
-                damages or _bvh,
+                makers.recording(form, file),
+                damages,
                 share=share / 2,
                 values=True,
             )
@@ -387,8 +161,8 @@ def _kinds() -> Iterator[Kind]:
         "segments, listed",
         "data/segments.csv",
         "data list --data-dir data --json out/figures.json",
-        _data,
-        _of(text.csv_cells),
+        makers.data,
+        formats.document(text.csv_cells),
         named=False,
         values=True,
     )
@@ -397,8 +171,8 @@ def _kinds() -> Iterator[Kind]:
         "data/segments.csv",
         "retarget --data-dir data --out out/motions --json out/figures.json "
         "--trajectories 0",
-        _data,
-        _of(text.csv_cells),
+        makers.data,
+        formats.document(text.csv_cells),
         named=False,
         partial=True,
         values=True,
@@ -407,8 +181,8 @@ def _kinds() -> Iterator[Kind]:
         "segments, fetched",
         "out/data/segments.csv",
         _FETCH,
-        _fetched,
-        _of(text.csv_cells),
+        makers.fetched,
+        formats.document(text.csv_cells),
         patches=_FETCH_PATCHES,
         share=0.5,
         named=False,
@@ -420,8 +194,8 @@ def _kinds() -> Iterator[Kind]:
         "manifest",
         "manifest.csv",
         _FETCH,
-        _mirror,
-        _of(text.csv_cells),
+        makers.mirror,
+        formats.document(text.csv_cells),
         patches=_FETCH_PATCHES,
         share=1.0,
         named=False,
@@ -432,10 +206,10 @@ def _kinds() -> Iterator[Kind]:
         "copy of a recording",
         "mirror/dog_mann/keypoints/made_trot.txt",
         _FETCH,
-        _mirror,
-        _table(",", 0),
+        makers.mirror,
+        formats.table(",", 0),
         patches=_FETCH_PATCHES,
-        share=0.3,
+        share=0.8,
         named=False,
         partial=True,
     )
@@ -446,8 +220,8 @@ def _kinds() -> Iterator[Kind]:
         "robot",
         "robot.yaml",
         f"{retarget} --robot {{target}}",
-        _robot,
-        _of(text.yaml_texts),
+        makers.robot,
+        formats.document(text.yaml_texts),
         share=1.5,
         values=True,
     )
@@ -455,8 +229,8 @@ def _kinds() -> Iterator[Kind]:
         "URDF",
         "robot.urdf",
         f"{retarget} --robot robot.yaml",
-        _robot,
-        _of(text.xml_texts),
+        makers.robot,
+        formats.document(text.xml_texts),
         share=2.0,
         named=False,
         values=True,
@@ -465,8 +239,8 @@ def _kinds() -> Iterator[Kind]:
         "source",
         "sources/dog.yaml",
         retarget,
-        _sources,
-        _of(text.yaml_texts),
+        makers.sources,
+        formats.document(text.yaml_texts),
         patches={"loco_drake.retargeting.scaling._SOURCES": "sources"},
         named=False,
         values=True,
@@ -477,19 +251,36 @@ def _kinds() -> Iterator[Kind]:
             f"results/{name}.json",
             "report --results results --replays none --out out/report.html "
             "--json out/figures.json",
-            _result(name),
-            _json,
-            share=0.2,
+            makers.result(name),
+            formats.json_document,
+            share=0.8,
             named=False,
         )
     yield Kind(
         "scenario",
         "scenario.yaml",
         f"{simulate} --scenario {{target}}",
-        _scenario,
-        _of(text.yaml_texts),
+        makers.scenario,
+        formats.document(text.yaml_texts),
         share=1.5,
         values=True,
+    )
+    yield Kind(
+        "commands to drive by",
+        "commands.csv",
+        f"{makers.DRIVE} --commands {{target}} --json out/figures.json "
+        "--record out/drive.jsonl",
+        makers.commands,
+        formats.commands,
+        values=True,
+    )
+    yield Kind(
+        "drive, repeated",
+        "drive.jsonl",
+        f"{makers.DRIVE} --replay {{target}} --json out/figures.json "
+        "--record out/drive.jsonl",
+        makers.drive,
+        drives.drive_files,
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from tests.fuzzing.damage import Damage
 from tests.fuzzing.judge import BEFORE, Leaves, differing, judge, outcome, snapshot
 from tests.fuzzing.kinds import KINDS, Kind, inputs
+from tests.fuzzing.processes import difference, run_process
 from tests.fuzzing.worker import Run, Worker
 
 VERDICTS = ("refused", "failed", "identical", "mended", "other value", "BAD")
@@ -31,6 +32,8 @@ class Options:
     """What they are drawn with."""
     kinds: tuple[str, ...] = ()
     """Parts of the names of kinds. Default: all."""
+    processes: int = 2
+    """Inputs of each kind that a process of its own gets, too, for comparison."""
     anew: bool = False
     """Does not go on with the record, but writes a new one."""
 
@@ -76,20 +79,24 @@ def fuzz(options: Options) -> int:
     with Fuzzer(options.keep) as fuzzer, record.open("a") as file:
         for kind in chosen:
             count = round(options.count * kind.share / total)
+            drawn = np.random.default_rng([options.seed, 1, *kind.name.encode()])
+            real = set(drawn.permutation(count)[: options.processes].tolist())
             for index, damage in enumerate(fuzzer.inputs(kind, count, options.seed)):
                 row = done.get((kind.name, index, damage.what))
                 if row is None:
                     verdict, why = fuzzer.attempt(
-                        kind, damage, f"{options.seed}-{index}"
+                        kind, damage, f"{options.seed}-{index}", real=index in real
                     )
                     row = {"kind": kind.name, "index": index, "what": damage.what}
-                    row |= {"verdict": verdict, "why": why}
+                    row |= {"verdict": verdict, "why": why, "process": index in real}
                     print(json.dumps(row), file=file, flush=True)
                     if verdict == "BAD":
                         print(f"{kind.name} {index}: {damage.what}: {why}", flush=True)
                 rows.append(row)
     print_table(rows)
+    compared = sum(row["process"] for row in rows)
     print(f"{len(rows)} inputs in {time.monotonic() - start:.0f} s")
+    print(f"{compared} of them in a process of their own, too")
     return int(any(row["verdict"] == "BAD" for row in rows))
 
 
@@ -129,11 +136,61 @@ class Fuzzer:
         random = np.random.default_rng([seed, *kind.name.encode()])
         return inputs(kind, data, count, random)
 
-    def attempt(self, kind: Kind, damage: Damage, label: str) -> tuple[str, str]:
-        """Returns the verdict on one input, and the reason if it is "BAD"."""
+    def attempt(
+        self, kind: Kind, damage: Damage, label: str, real: bool = False
+    ) -> tuple[str, str]:
+        """Returns the verdict on one input, and the reason if it is "BAD".
+
+        Args:
+            kind: of the input.
+            damage: to the input.
+            label: name of the folder for it if it is "BAD".
+            real: whether to compare with a process of its own.
+        """
         sound = self._of(kind)
+        target = self._lay(kind, damage, sound)
         case = Path(self._scratch.name) / "case"
         work = case / "work"
+        before = snapshot(case)
+        run = self._run(kind, work, target.relative_to(work), sound.run.seconds)
+        leaves: Leaves | str = {}
+        if run.status == 0:
+            try:
+                leaves = outcome(work / "out")
+            except Exception as error:  # whatever a half-written file leads to
+                leaves = f"{type(error).__name__}: {error}"
+        files = before, snapshot(case)
+        verdict, why = judge(
+            damage,
+            kind,
+            run,
+            sound.run,
+            files,
+            (sound.leaves, leaves),
+            sound.varying,
+        )
+        if real and verdict != "BAD":
+            shutil.rmtree(case)
+            self._lay(kind, damage, sound)
+            place = target.relative_to(work)
+            alone = self._run(kind, work, place, sound.run.seconds, real=True)
+            why = difference(run, alone)
+            if why:
+                verdict, why = "BAD", f"a process of its own: {why}"
+        if verdict == "BAD":
+            kept = self._keep / re_named(kind.name) / label
+            shutil.rmtree(kept, ignore_errors=True)
+            kept.mkdir(parents=True)
+            if damage.place is None:
+                (kept / Path(kind.target).name).write_bytes(damage.data[: 2**24])
+            told = [damage.what, why, " ".join(self._argv(kind, target)), run.stderr]
+            (kept / "what").write_text("\n".join(told), errors="replace")
+        shutil.rmtree(case)
+        return verdict, why
+
+    def _lay(self, kind: Kind, damage: Damage, sound: Sound) -> Path:
+        """Lays out what a command needs, with the damaged file; returns its path."""
+        work = Path(self._scratch.name) / "case" / "work"
         shutil.copytree(sound.folder, work)
         target = work / kind.target
         target.unlink()
@@ -147,34 +204,7 @@ class Fuzzer:
             for name in sound.written:
                 (work / "out" / name).parent.mkdir(parents=True, exist_ok=True)
                 (work / "out" / name).write_bytes(BEFORE)
-        before = snapshot(case)
-        run = self._run(kind, work, target.relative_to(work), sound.run.seconds)
-        leaves: Leaves | str = {}
-        if run.status == 0:
-            try:
-                leaves = outcome(work / "out")
-            except Exception as error:  # whatever a half-written file leads to
-                leaves = f"{type(error).__name__}: {error}"
-        files = before, snapshot(case)
-        verdict, why = judge(
-            kind.values or damage.legal,
-            kind,
-            run,
-            sound.run,
-            files,
-            (sound.leaves, leaves),
-            sound.varying,
-        )
-        if verdict == "BAD":
-            kept = self._keep / re_named(kind.name) / label
-            shutil.rmtree(kept, ignore_errors=True)
-            kept.mkdir(parents=True)
-            if damage.place is None:
-                (kept / Path(kind.target).name).write_bytes(damage.data[: 2**24])
-            told = [damage.what, why, " ".join(self._argv(kind, target)), run.stderr]
-            (kept / "what").write_text("\n".join(told), errors="replace")
-        shutil.rmtree(case)
-        return verdict, why
+        return target
 
     def _argv(self, kind: Kind, target: Path) -> list[str]:
         return [
@@ -182,10 +212,13 @@ class Fuzzer:
             for word in kind.command.split()
         ]
 
-    def _run(self, kind: Kind, work: Path, target: Path, seconds: float) -> Run:
+    def _run(
+        self, kind: Kind, work: Path, target: Path, seconds: float, real: bool = False
+    ) -> Run:
         (work / "out").mkdir(exist_ok=True)
         cache = Path(tempfile.gettempdir()) / "loco_drake_fuzzing_cache"
-        return self._worker.run(
+        run = run_process if real else self._worker.run
+        return run(
             self._argv(kind, target),
             work,
             {name: str(work / path) for name, path in kind.patches.items()},

@@ -15,6 +15,7 @@ FEW = {
     "trained on": 5,
     "of a token": 5,
     "scenario": 4,
+    "drive": 4,
 }
 
 

@@ -183,6 +183,7 @@ def _serve() -> None:
         importlib.import_module(name)
     for line in sys.stdin:
         print(json.dumps(_run(json.loads(line))), file=protocol, flush=True)
+    os._exit(0)  # at once: there is nothing to put away
 
 
 if __name__ == "__main__":
