@@ -44,6 +44,8 @@ _INTEGRALS = {
 _XYZW = [3, 0, 1, 2]
 _DOUBT = 0.2  # of what is rounding
 _TINY = 1e-9
+_SLOW = 0.1  # m/s or rad/s; slower is standing
+_ALIKE = 0.01  # of the highest velocity
 _MOST_LATE = 10  # frames that velocities may be found to lag; up to 2 are a filter's
 
 
@@ -176,7 +178,8 @@ def _check_derivative(
     given = getattr(motion, name)[1:-1]
     off, speed = _rms(given - true), _rms(true)
     others |= {"all zero": np.zeros_like(true), "in reverse": true[::-1]}
-    for late in (k for k in range(-_MOST_LATE, _MOST_LATE + 1) if abs(k) > 2):
+    most = min(_MOST_LATE, len(true) // 2)  # beyond, too little is compared
+    for late in (k for k in range(-most, most + 1) if abs(k) > 2):
         moved = np.roll(true, late, axis=0)
         ends = slice(late) if late > 0 else slice(late, None)
         moved[ends] = given[ends]  # of which nothing is known
@@ -189,6 +192,27 @@ def _check_derivative(
             f"The values of {name} are not the derivatives of {_INTEGRALS[name]} at "
             f"{motion.fps:g} frames/s" + (f"; they are {best}." if found else ".")
         )
+
+
+def velocity_deviations(motion: Motion) -> dict[str, float]:
+    """Returns how far velocities are from differences of the positions.
+
+    Returns:
+        the largest deviation as a fraction of the highest velocity, by array; only of
+        those where it is above a hundredth. One-sided differences count at both ends.
+    """
+    rate, deviations = 1 / motion.fps, {}
+    quaternion = quat_continuous(motion.base_quaternion)
+    for name, true in (
+        ("base_velocity", np.gradient(motion.base_position, rate, axis=0)),
+        ("base_angular_velocity", angular_velocity(quaternion, rate)),
+        ("joint_velocities", np.gradient(motion.joint_positions, rate, axis=0)),
+    ):
+        given, highest = getattr(motion, name), max(np.abs(true).max(), _SLOW)
+        off = float(np.abs(given - true).max() / highest)
+        if off > _ALIKE:
+            deviations[name] = off
+    return deviations
 
 
 def _rms(values: Array) -> float:

@@ -51,14 +51,19 @@ def load_motion(path: Path) -> Motion:
     """Reads a Motion file and checks it; all commands and functions use this reader.
 
     Joints in another order than the robot's are reordered, which is reported on stderr
-    and in the provenance.
+    and in the provenance. So are, on stderr only, velocities in a file without a hash
+    that differ from the derivatives of the positions.
 
     Raises:
         InputError: if the file is missing, damaged, of a newer schema, or fails a
             check of :class:`Motion` or :func:`.conventions.check_conventions`.
     """
     # It imports Drake, which --help and writers do not need.
-    from loco_drake.motion.conventions import check_conventions, in_robot_order
+    from loco_drake.motion.conventions import (
+        check_conventions,
+        in_robot_order,
+        velocity_deviations,
+    )
 
     path = Path(path)
     try:
@@ -66,10 +71,10 @@ def load_motion(path: Path) -> Motion:
             raise InputError(f"There is no Motion file {str(path)!r}.")
         header, arrays = _read(path)
         claimed = header.pop("content_sha256", None)
-        motion = _make(header, arrays)
-        if claimed not in (None, _content_sha256(header, arrays)):
-            raise InputError("It is damaged: its content does not match its hash.")
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused
+            motion = _make(header, arrays)
+            if claimed not in (None, _content_sha256(header, arrays)):
+                raise InputError("It is damaged: its content does not match its hash.")
             check_conventions(ordered := in_robot_order(motion))
     except InputError as error:
         named = str(path) in str(error)
@@ -80,6 +85,14 @@ def load_motion(path: Path) -> Motion:
         ) from None
     if ordered is not motion:
         text = f"{path}: joints {ordered.provenance['joints']}."
+        print(one_line(text), file=sys.stderr)
+    deviations = velocity_deviations(ordered) if claimed is None else {}
+    if deviations:
+        worst = ", ".join(f"{name} by {off:.0%}" for name, off in deviations.items())
+        text = (
+            f"{path} has no hash, and velocities differ from the derivatives of the "
+            f"positions: {worst} of the highest."
+        )
         print(one_line(text), file=sys.stderr)
     return ordered
 

@@ -91,17 +91,51 @@ def test_a_number_changed_by_hand_is_refused_by_the_hash(whole, tmp_path):
 
 def test_files_of_earlier_versions_have_no_hash_and_are_read(whole, tmp_path):
     members = members_of(whole)
-    pack(tmp_path / "a.npz", with_header(members, json.dumps(header_of(members))))
+    pack(tmp_path / "a.npz", without_hash(members))
     again = load_motion(tmp_path / "a.npz")
     np.testing.assert_array_equal(
         again.joint_positions, load_motion(whole).joint_positions
     )
 
 
+def without_hash(members):
+    return with_header(members, json.dumps(header_of(members)))
+
+
+@pytest.mark.parametrize(
+    ("name", "frame"), [("base_velocity", 4), ("joint_velocities", 0)]
+)
+def test_a_velocity_that_is_no_derivative_is_reported(
+    whole, tmp_path, capsys, name, frame
+):
+    """A hundredth of the highest is rounding; 5 % more are said, with the number."""
+    members = without_hash(members_of(whole))
+    original = np.load(io.BytesIO(members[f"{name}.npy"]))
+    highest = np.abs(original).max()
+    for off, said in ((0.0, ""), (0.005, ""), (0.06, f"{name} by 6% of the highest.")):
+        values = original.copy()
+        values[frame, 0] += off * highest
+        pack(tmp_path / "a.npz", {**members, f"{name}.npy": npy(values)})
+        again = load_motion(tmp_path / "a.npz")
+        np.testing.assert_array_equal(getattr(again, name), values)
+        heard = capsys.readouterr().err
+        assert heard.endswith(f"positions: {said}\n") if said else heard == ""
+
+
+@pytest.mark.parametrize("name", [name for name in UNITS if name != "contacts"])
+def test_numbers_that_overflow_are_refused_without_a_warning(whole, tmp_path, name):
+    members = without_hash(members_of(whole))
+    values = np.load(io.BytesIO(members[f"{name}.npy"]))
+    values[3] = 1e300
+    pack(tmp_path / "a.npz", {**members, f"{name}.npy": npy(values)})
+    with pytest.raises(InputError, match=r"a\.npz: "):
+        load_motion(tmp_path / "a.npz")
+
+
 @pytest.mark.parametrize("dtype", [">f8", "<f4", ">f4"])
 def test_other_byte_orders_and_32_bits_are_read(whole, tmp_path, dtype):
     members = members_of(whole)
-    members = with_header(members, json.dumps(header_of(members)))
+    members = without_hash(members)
     for name in set(UNITS) - {"contacts"}:
         values = np.load(io.BytesIO(members[f"{name}.npy"]))
         members[f"{name}.npy"] = npy(np.asfortranarray(values).astype(dtype))
