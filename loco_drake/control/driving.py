@@ -119,7 +119,10 @@ def read_commands(path: Path, gait: str) -> OrderTable:
         InputError: if the file cannot be read or a value is amiss; the message names
             the line.
     """
-    lines = list(csv.reader(io.StringIO(read_text(path))))
+    try:
+        lines = list(csv.reader(io.StringIO(read_text(path))))
+    except csv.Error as error:
+        raise InputError(f"{path} is no table of commands: {error}.") from None
     names = [name.strip() for name in lines[0]] if lines else []
     known = set(names) <= set(COLUMNS) and len(set(names)) == len(names)
     if not known or not set(_NEEDED) <= set(names):
