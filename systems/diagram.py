@@ -165,7 +165,8 @@ def AddLocomotion(
             meshcat=meshcat,
         )
         if "plan" in made.outputs:
-            drawing = KeypointVisualizer(robot, meshcat)
+            period = scenario.visualization.publish_period
+            drawing = KeypointVisualizer(robot, meshcat, period=period)
             _Add(builder, "plan_visualizer", drawing, plan=made.outputs["plan"])
     return made
 

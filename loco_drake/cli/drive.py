@@ -76,12 +76,14 @@ class Drive:
         from loco_drake.cli.drive_view import DriveView
         from loco_drake.control.drive_file import save_drive, states_sha256
         from loco_drake.control.plan import PLAN_DT
+        from loco_drake.evaluation.drive_scores import drive_scores
         from loco_drake.evaluation.driving import drive
         from loco_drake.evaluation.tracking import (
             FRAMES_PER_SECOND,
             Recorder,
             tracking_metrics,
         )
+        from loco_drake.models.robots import get_robot
         from loco_drake.systems.command_source import CommandSource
         from loco_drake.systems.meshcat_driver import MeshcatDriver
 
@@ -130,6 +132,7 @@ class Drive:
             "fell": rollout.fell,
             "falls": driven.falls,
             **tracking_metrics(rollout),
+            **drive_scores(get_robot(header["robot"]), driven),
             "real_time_factor": simulated / driven.wall,
             "wall_clock_s": pace.elapsed,
         }
@@ -177,6 +180,7 @@ class Drive:
         Raises:
             InputError: if a field is amiss.
         """
+        from loco_drake.control.plan import PLAN_DT
         from loco_drake.systems.scenario import (
             GeneratedReference,
             LoadScenario,
@@ -194,6 +198,9 @@ class Drive:
             raise InputError("The reference of a scenario to drive must be generated.")
         override(scenario.reference, gait=self.gait, seed=self.seed)
         scenario.disturbances.pushes = True
+        if scenario.plant.contact == "cenic":
+            # Pictures at other times would change the steps of the integrator.
+            scenario.visualization.publish_period = PLAN_DT
         scenario.check()
         if scenario.steering is None or not isinstance(scenario.policy, TrainedPolicy):
             raise InputError(

@@ -109,7 +109,14 @@ class Pace:
 
 def print_figures(title: str, figures: dict[str, object]) -> None:
     """Prints the figures of a simulation with their units."""
-    units = {"_rad": "rad", "_mps": "m/s", "_m": "m", "_s": "s", "_return": "of 100"}
+    units = {
+        "_rad": "rad",
+        "_radps": "rad/s",
+        "_mps": "m/s",
+        "_m": "m",
+        "_s": "s",
+        "_return": "of 100",
+    }
     rows = []
     for name, value in figures.items():
         text = f"{value:.3f}" if isinstance(value, float) else str(value)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from loco_drake.common.arrays import Array
+from loco_drake.common.arrays import Array, Integers
 from loco_drake.common.errors import InputError, check_number, quoted
 from loco_drake.common.files import read_text
 from loco_drake.control.command import ANY_COMMAND
@@ -40,16 +40,21 @@ class OrderTable:
     times: Array  # s, ascending, shape (N,)
     rows: Array  # shape (N, ORDERS)
 
+    def index(self, times: Array) -> Integers:
+        """Returns the row that is in force at each of ``times`` (N,), s."""
+        found = np.searchsorted(self.times, times + _TOLERANCE, side="right")
+        return np.maximum(found - 1, 0)
+
     def at(self, time: float) -> Array:
         """Returns the orders in the control period that begins at ``time``, (ORDERS,).
 
         Command and gait last until the next row, a push and a reset for one period.
         """
-        begin, end = np.searchsorted(
+        before, now = np.searchsorted(
             self.times, np.array([time - PLAN_DT, time]) + _TOLERANCE, side="right"
         )
-        orders: Array = self.rows[max(end - 1, 0)].copy()
-        recent = self.rows[begin:end]
+        orders: Array = self.rows[max(now - 1, 0)].copy()
+        recent = self.rows[before:now]
         orders[PUSH] = recent[:, PUSH].sum()
         orders[RESET] = recent[:, RESET].max(initial=0.0)
         return orders

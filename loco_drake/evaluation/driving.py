@@ -6,16 +6,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from loco_drake.common.arrays import Array
+from loco_drake.common.arrays import Array, Integers
 from loco_drake.common.rotations import yaw_of
 from loco_drake.control.domain import Domain, Push
-from loco_drake.control.driving import PUSH, RESET, OrderTable, order_table
+from loco_drake.control.driving import COMMAND, PUSH, RESET, OrderTable, order_table
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.state import ORIENTATION
+from loco_drake.evaluation.steering import reference_latency
 from loco_drake.evaluation.tracking import Recorder, Rollout
 from loco_drake.systems.domain import SetDomain
 from loco_drake.systems.simulator import PlaceOnPlan
 from loco_drake.tracking.randomization import PUSH_DURATION
+
+# s; a command that differs no more than this late is one that is not followed.
+_LONGEST_LATENCY = 1.0
 
 
 @dataclass(frozen=True)
@@ -25,6 +29,9 @@ class Driven:
     rollout: Rollout  # the reward is 0 while the robot lies
     table: OrderTable  # the orders in every control period
     falls: int
+    lying: Integers  # samples at which the robot lies
+    # Seconds from a change of the command to the first sample of the plan that differs.
+    latencies: list[float]
     wall: float  # seconds inside AdvanceTo
 
 
@@ -51,6 +58,7 @@ def drive(
     times: list[float] = []
     rows: list[Array] = []
     lying: list[int] = []
+    latencies = _Latencies(recorder)
     wall, done, falls = 0.0, 0, 0
     lies, goes_on = False, True
     while goes_on and (steps is None or done < steps):
@@ -58,6 +66,7 @@ def drive(
         recorder.simulator.AdvanceTo((done + 1) * PLAN_DT)
         wall += time.perf_counter() - start
         orders = source.orders(source_context)
+        latencies.update(done * PLAN_DT, orders[COMMAND])
         acts = orders[PUSH] != 0 or orders[RESET] != 0
         if not rows or acts or (orders[:PUSH] != rows[-1][:PUSH]).any():
             times.append(done * PLAN_DT)
@@ -77,7 +86,42 @@ def drive(
     reward = rollout.reward
     reward[lying] = 0.0
     rollout = replace(rollout, reward=reward, fell=falls > 0)
-    return Driven(rollout, order_table(times, rows), falls, wall)
+    return Driven(
+        rollout,
+        order_table(times, rows),
+        falls,
+        np.array(lying, dtype=np.int64),
+        latencies.found,
+        wall,
+    )
+
+
+class _Latencies:
+    """Measures how soon the plan differs after a change of the command."""
+
+    def __init__(self, recorder: Recorder) -> None:
+        self._context = recorder.context
+        self._port = recorder.diagram.GetOutputPort("plan")
+        self._command: Array | None = None
+        self._plan = self._port.Eval(self._context)
+        self._changed: float | None = None  # when the change came that is waited for
+        self.found: list[float] = []
+
+    def update(self, begun: float, command: Array) -> None:
+        """Takes note of the control period that began at ``begun``, s."""
+        if self._command is not None and (command != self._command).any():
+            # Of changes that come before the plan differs, the first counts.
+            self._changed = begun if self._changed is None else self._changed
+        self._command = command
+        plans = [self._plan, self._port.Eval(self._context)]
+        self._plan = plans[1]
+        if self._changed is None:
+            return
+        due = reference_latency(plans, 0)
+        if due is not None:
+            self.found.append(due - self._changed)
+        if due is not None or begun - self._changed > _LONGEST_LATENCY:
+            self._changed = None
 
 
 def _push(recorder: Recorder, impulse: float) -> None:

@@ -92,7 +92,8 @@ class Recorder:
                 port = self._made.inputs.pop(name)
                 builder.Connect(source.GetOutputPort(name), port)
         if follow and meshcat is not None:
-            camera = FollowCamera(self._made.robot, meshcat)
+            period = scenario.visualization.publish_period
+            camera = FollowCamera(self._made.robot, meshcat, period)
             builder.AddNamedSystem("follow_camera", camera)
             builder.Connect(self._made.outputs["state"], camera.GetInputPort("state"))
         self._logs = [
