@@ -1,8 +1,8 @@
 """Change the gait while the robot runs: from a pace to a trot to a horse's walk.
 
 The first change is in the scenario, to the second. The other is made on the way,
-through the diagram's input port; it shows after some seconds, since the generator
-writes ahead of the robot. Prints the speed with each gait.
+through the diagram's input port, and shows within a second. Prints the speed with each
+gait.
 """
 
 from math import hypot
