@@ -17,6 +17,8 @@ from loco_drake.common.typed import FieldError, convert
 
 FORMAT_VERSION = 1
 MAX_BYTES = 4 * 2**30  # of a file
+# No training leads there; it is what a flipped bit of an exponent leaves.
+MAX_VALUE = 1e12
 MAX_SIZE = 4096  # any number of channels, layers, codes, ... in a header
 
 Network = TypeVar("Network", bound=torch.nn.Module)
@@ -108,6 +110,10 @@ def load_weights(
         finite = not value.is_floating_point() or value.float().isfinite().all()
         if not finite and name not in may_be_nan:
             raise InputError(f"{path} is damaged: {quoted(name)} is not finite.")
+        if value.is_floating_point() and (value.double().abs() > MAX_VALUE).any():
+            raise InputError(
+                f"{path} is damaged: {quoted(name)} holds numbers beyond {MAX_VALUE:g}."
+            )
         if value.dtype == torch.float16:
             tensors[name] = value.float()
     return tensors, header["config"]

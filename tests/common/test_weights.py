@@ -161,6 +161,21 @@ def test_what_is_not_finite_is_refused(tmp_path, value):
         load_weights(path, "policy")
 
 
+@pytest.mark.parametrize("kind", [torch.float32, torch.float64, torch.bfloat16])
+def test_what_no_training_leads_to_is_refused(tmp_path, kind):
+    """Files without a hash, too: the highest bit of an exponent changes so much."""
+    path = tmp_path / "w.safetensors"
+    for value, refused in ((1e11, False), (-1e30, True)):
+        header = {"format_version": 1, "kind": "policy", "config": {}}
+        tensors = {"a": torch.tensor([1.0, value], dtype=kind)}
+        save_file(tensors, path, metadata={"loco_drake": json.dumps(header)})
+        if refused:
+            with pytest.raises(InputError, match="'a' holds numbers beyond 1e\\+12"):
+                load_weights(path, "policy")
+        else:
+            load_weights(path, "policy")
+
+
 @dataclass(frozen=True)
 class LinearConfig:
     inputs: int

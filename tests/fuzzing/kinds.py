@@ -245,7 +245,7 @@ def _kinds() -> Iterator[Kind]:
         named=False,
         values=True,
     )
-    for name in ("tracking-go2-generated", "retargeting", "generation", "learning-go2"):
+    for name in makers.results():
         yield Kind(
             f"results, {name}",
             f"results/{name}.json",

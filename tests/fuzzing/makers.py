@@ -142,12 +142,23 @@ def sources(folder: Path) -> None:
     shutil.copytree(Path(scaling.__file__).parent / "sources", folder / "sources")
 
 
+def results() -> list[str]:
+    """Returns the name of one shipped result of each command that writes some."""
+    from loco_drake.models.shipped import results_path
+
+    stems = [path.stem for path in results_path("any").parent.glob("*.json")]
+    families: dict[str, str] = {}
+    for stem in sorted(stems, reverse=True):
+        families[stem.split("-")[0]] = stem
+    return sorted(families.values())
+
+
 def result(name: str) -> Callable[[Path], None]:
     def make(folder: Path) -> None:
-        from loco_drake.models.shipped import pretrained_dir
+        from loco_drake.models.shipped import results_path
 
         (folder / "results").mkdir()
-        shutil.copy(pretrained_dir() / "results" / f"{name}.json", folder / "results")
+        shutil.copy(results_path(name), folder / "results")
 
     return make
 

@@ -105,7 +105,7 @@ class Worker:
 
 
 def _child(request: dict, out: int, err: int) -> None:
-    os.setsid()
+    os.setpgid(0, 0)  # to end what it starts; it keeps the session's priority
     null = os.open(os.devnull, os.O_RDONLY)
     for own, other in ((0, null), (1, out), (2, err)):
         os.dup2(other, own)
