@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 _PERIOD = 0.5  # s between updates
 _WINDOW = 5.0  # s; of the return that is shown
+_NOTED = 3.0  # s for which what happened is shown
+_FELL = "it fell: R puts it upright"
 _HINT_UNTIL = 15.0  # s
 _HINT = "W S A D Q E drive, Space halts; see also Open Controls"
 
@@ -53,7 +55,7 @@ class DriveView:
         )
         self._rewards: deque[float] = deque(maxlen=round(_WINDOW / PLAN_DT))
         self._speeds: deque[float] = deque(maxlen=round(_PERIOD / PLAN_DT))
-        self._happened = ""
+        self._happened, self._until = "", 0.0
 
     def __enter__(self) -> Self:
         if self._line is not None:
@@ -85,9 +87,9 @@ class DriveView:
         reward = diagram.GetOutputPort("reward_terms").Eval(context).sum()
         self._rewards.append(0.0 if self._recorder.fell else float(reward))
         if orders[PUSH]:
-            self._happened = f"pushed by {abs(orders[PUSH]):g} N s"
+            self._note(f"pushed by {abs(orders[PUSH]):g} N s", now)
         if orders[RESET]:
-            self._happened = "put upright"
+            self._note("put upright", now)
         if round(now / PLAN_DT) % round(_PERIOD / PLAN_DT):
             return
         lines = self._lines(now, orders)
@@ -96,7 +98,9 @@ class DriveView:
         if self._line is not None:
             text = Text("  |  ".join(lines), no_wrap=True, overflow="ellipsis")
             self._line.update(text, refresh=True)
-        self._happened = ""
+
+    def _note(self, text: str, now: float) -> None:
+        self._happened, self._until = text, now + _NOTED
 
     def _lines(self, now: float, orders: Array) -> list[str]:
         diagram, context = self._recorder.diagram, self._recorder.context
@@ -109,8 +113,8 @@ class DriveView:
         ]
         notes = [] if self._driver is None else list(self._driver.notes)
         if self._recorder.fell:
-            notes.append("it fell: press R to put it upright")
-        if self._happened:
+            notes.append("it fell" if self._driver is None else _FELL)
+        if now < self._until:
             notes.append(self._happened)
         if self._driver is not None and now < _HINT_UNTIL:
             notes.append(_HINT)

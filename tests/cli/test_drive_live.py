@@ -70,7 +70,15 @@ def test_keys_in_a_browser_drive_the_robot_and_the_page_shows_it(drive, tmp_path
         browser.wait_for(f"Math.hypot({world}.x, {world}.y) > 1")
         browser.press("Space")
         browser.wait_for(f"{SHOWN}?.includes('command 0.00 and 0.00 m/s, 0.00 rad/s')")
+        # A gamepad with its left stick at the front, which then is pulled out.
+        pad = "{index: 0, connected: true, buttons: [], axes: [0, -1, 0, 0]}"
+        browser.evaluate(f"navigator.getGamepads = () => [{pad}]")
+        browser.wait_for(f"{SHOWN}?.includes('command 2.00 and 0.00 m/s')")
+        browser.evaluate("navigator.getGamepads = () => []")
+        browser.wait_for(f"{SHOWN}?.includes('command 0.00 and 0.00 m/s')")
+        browser.wait_for(f"{SHOWN}?.includes('gamepad is gone')")
         browser.press("KeyR")
+        browser.wait_for(f"{SHOWN}?.includes('put upright')")
         browser.press("Escape")
         printed, error = process.communicate(timeout=LIMIT)
     assert process.returncode == 0, error
@@ -78,11 +86,12 @@ def test_keys_in_a_browser_drive_the_robot_and_the_page_shows_it(drive, tmp_path
     rows = load_drive(tmp_path / "a.drive").table.rows
     for column, value in enumerate((0.6, -0.2, 0.5)):
         assert value in rows[:, column]
+    assert rows[:, 0].max() == 2.0
     np.testing.assert_array_equal(rows[0], [0, 0, 0, 1, 0, 0])
     assert rows[-1, 3] == LABELS.index(parse_label("dog-pace"))
     assert (rows[:, 4].max(), rows[-1, 5]) == (6.0, 1.0)
     figures = json.loads((tmp_path / "a.json").read_text())
-    assert 0.02 < figures["speed_mps"] < 0.6
+    assert 0.02 < figures["speed_mps"] < 2.0
     # Without the page, and as fast as it goes, it is the same drive.
     line = ["drive", "--replay", str(tmp_path / "a.drive"), "--no-meshcat"]
     assert main([*line, "--json", str(tmp_path / "b.json")]) == 0
