@@ -104,7 +104,7 @@ def train_tracker(
     ):
         steps_before = held.saved.state["steps"] if held.saved else 0
         log = Path(folder) / PROGRESS
-        trim_log(log, steps_before)
+        trim_log(log, steps_before, config.ppo.batch)
         environment = WorkerVecEnv(
             plans,
             config.environment.known_to(privileged=config.ppo.privileged),

@@ -26,6 +26,7 @@ class Kind:
         in_place: whether what is in out/ is what the command goes on with.
         values: whether another value in the file is another input, not damage, as long
             as what comes of it can be.
+        alike: tells of the sound file and another whether that may be sound, too.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Kind:
     partial: bool = False
     in_place: bool = False
     values: bool = False
+    alike: Callable[[bytes, bytes], bool] | None = None
 
 
 # File, source, gait, and how its numbers are written.
@@ -132,7 +134,7 @@ def _kinds() -> Iterator[Kind]:
         share=0.8,
         named=False,
         in_place=True,
-        values=True,
+        alike=formats.logs_alike,
     )
     yield Kind(
         "checkpoint to start from",

@@ -6,7 +6,7 @@ import shutil
 import tempfile
 import time
 from collections import Counter, defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -151,6 +151,10 @@ class Fuzzer:
         target = self._lay(kind, damage, sound)
         case = Path(self._scratch.name) / "case"
         work = case / "work"
+        if kind.alike is not None and damage.place is None:
+            data = (sound.folder / kind.target).read_bytes()
+            legal = damage.legal or kind.alike(data, damage.data)
+            damage = replace(damage, legal=legal)
         before = snapshot(case)
         run = self._run(kind, work, target.relative_to(work), sound.run.seconds)
         leaves: Leaves | str = {}

@@ -1,8 +1,12 @@
 """Learning curves from logs written by hand."""
 
 import json
+import re
 
-from loco_drake.tracking.learning_curve import learning_curve
+import pytest
+
+from loco_drake.common.errors import InputError
+from loco_drake.tracking.learning_curve import learning_curve, trim_log
 
 
 def write(path, rows):
@@ -56,5 +60,49 @@ def test_damaged_lines_are_passed_over(tmp_path):
     wrong = ['{"steps": 3, "sec', "[1]", '{"steps": 3}', "\x00", "[" * 100_000]
     wrong += ['{"steps": 3, "seconds": []}', '{"steps": 3, "seconds": NaN}']
     wrong += [f'{{"steps": {10**400}, "seconds": 3.0}}']
+    wrong += ['{"steps": 3, "seconds": "4"}', '{"steps": 3.5, "seconds": 4}']
+    wrong += ['{"steps": 3, "seconds": 4, "train/std": true}']
     path.write_text("\n".join([wrong[0], *log.read_text().splitlines(), *wrong]))
     assert learning_curve(log) == sound
+
+
+def test_lines_of_a_lost_run_are_removed_without_a_word(tmp_path, capsys):
+    """Those after the checkpoint; and a run that ended wrote none for its end."""
+    rows = [(n, float(n), {}) for n in (32, 64, 96)]
+    log = write(tmp_path / "progress.jsonl", rows)
+    for steps, left in ((96, 3), (64, 2), (96, 2)):
+        trim_log(log, steps, 32)
+        assert len(log.read_text().splitlines()) == left
+    trim_log(tmp_path / "none.jsonl", 32, 32)
+    assert capsys.readouterr().err == ""
+    assert not (tmp_path / "none.jsonl").exists()
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda t: "garbage\n" + t, "1 damaged lines were removed"),
+        (lambda t: t + t, "3 damaged lines were removed"),
+        (lambda t: t[:90], "1 damaged .*; it ends at step 32, but .* at step 96"),
+        (lambda t: "", "it ends at step 0, but the checkpoint at step 96"),
+    ],
+)
+def test_what_is_lost_of_a_log_is_reported(tmp_path, capsys, damage, said):
+    log = write(tmp_path / "a.jsonl", [(n, float(n), {}) for n in (32, 64, 96)])
+    log.write_text(damage(log.read_text()))
+    trim_log(log, 96, 32)
+    heard = capsys.readouterr().err
+    assert re.fullmatch(rf"{re.escape(str(log))}: {said}\.\n", heard)
+    kept = [json.loads(line)["steps"] for line in log.read_text().splitlines()]
+    assert kept == [32, 64, 96][: len(kept)]
+
+
+def test_what_is_no_log_is_refused(tmp_path):
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    with (tmp_path / "huge").open("wb") as file:
+        file.truncate(10**12)
+    for name, reason in (("zero", "is not a file"), ("huge", "larger than 256 MB")):
+        with pytest.raises(InputError, match=reason):
+            trim_log(tmp_path / name, 32, 32)
+    with pytest.raises(InputError, match="is not a file"):
+        trim_log(tmp_path, 32, 32)
