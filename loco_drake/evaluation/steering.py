@@ -70,9 +70,14 @@ def stride_of(robot: Robot, q: Array) -> float:
     return stride_period(track) or _DEFAULT_STRIDE
 
 
-def rmse(errors: Sequence[Array]) -> tuple[float, float]:
-    """Returns velocity_rmse_mps and yaw_rate_rmse of errors (N, 3) of many points."""
+def rmse(errors: Sequence[Array]) -> tuple[float, float] | tuple[None, None]:
+    """Returns velocity_rmse_mps and yaw_rate_rmse of errors (N, 3) of many points.
+
+    They are None without any sample.
+    """
     all_errors = np.concatenate(errors)
+    if not len(all_errors):
+        return None, None
     squares = np.mean(all_errors**2, axis=0)
     return float(np.sqrt(squares[:2].sum())), float(np.sqrt(squares[2]))
 

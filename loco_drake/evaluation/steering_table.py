@@ -37,6 +37,7 @@ from loco_drake.evaluation.steering import (
 from loco_drake.evaluation.tracking import (
     Recorder,
     Rollout,
+    effort_metrics,
     normalized_return,
     slip_speeds,
     stretch,
@@ -60,6 +61,14 @@ _SHRINK, _TRIES = 0.85, 8
 _LEAST = 0.02
 
 
+def keeps_goals(errors: Sequence[Array]) -> bool:
+    """Returns whether errors (N, 3) of points are within the goals, all together."""
+    velocity, yaw_rate = rmse(errors)
+    if velocity is None or yaw_rate is None:
+        return False
+    return velocity <= VELOCITY_GOAL and yaw_rate <= YAW_RATE_GOAL
+
+
 @dataclass(frozen=True)
 class Point:
     """The result of one command."""
@@ -67,6 +76,7 @@ class Point:
     command: Array  # shape (3,)
     velocities: Array  # over a stride, of the samples that count, shape (N, 3)
     normalized_return: float
+    cost_of_transport: float
     fell: bool
 
     @property
@@ -85,10 +95,7 @@ class Point:
     @property
     def is_good(self) -> bool:
         """Whether the robot stands and keeps the goals."""
-        if self.fell:
-            return False
-        velocity, yaw_rate = rmse([self.errors])
-        return velocity <= VELOCITY_GOAL and yaw_rate <= YAW_RATE_GOAL
+        return not self.fell and keeps_goals([self.errors])
 
 
 @dataclass(frozen=True)
@@ -113,13 +120,6 @@ class _Driver:
         seed = course.seeds[0]
         within = course.range or self._search(course.label, seed)
         points = [self._point(course.label, c, seed) for c in grid(within)]
-        for _ in range(_TRIES if course.range is None else 0):
-            velocity, yaw_rate = rmse([p.errors for p in points])
-            good = velocity <= VELOCITY_GOAL and yaw_rate <= YAW_RATE_GOAL
-            if good and not any(p.fell for p in points):
-                break
-            within = within.scaled(_SHRINK)
-            points = [self._point(course.label, c, seed) for c in grid(within)]
         velocity, yaw_rate = rmse([p.errors for p in points])
         return {
             "range": within.figures(),
@@ -132,6 +132,7 @@ class _Driver:
                     "command": p.command.tolist(),
                     "velocity": p.velocity,
                     "normalized_return": p.normalized_return,
+                    "cost_of_transport": p.cost_of_transport,
                     "fell": p.fell,
                 }
                 for p in points
@@ -155,7 +156,23 @@ class _Driver:
                     if not self._point(label, command, seed).is_good:
                         break
                     end[axis] = value
-        return CommandRange(tuple(low.tolist()), tuple(high.tolist()))
+        within = CommandRange(tuple(low.tolist()), tuple(high.tolist()))
+        for _ in range(_TRIES):
+            if self._keeps_goals(label, within, seed):
+                break
+            within = within.scaled(_SHRINK)
+        return within
+
+    def _keeps_goals(self, label: str, within: CommandRange, seed: int) -> bool:
+        """Returns whether the whole grid keeps the goals without a fall."""
+        errors = []
+        # From the corners, where falls come first.
+        for command in reversed(grid(within)):
+            point = self._point(label, command, seed)
+            if point.fell:
+                return False
+            errors.append(point.errors)
+        return keeps_goals(errors)
 
     def _pace(self, label: str, seed: int) -> Array:
         """Returns the mean velocity of the gait's plan without a command, (3,)."""
@@ -192,7 +209,14 @@ class _Driver:
         rollout = self._run(label, seed, _POINT, lambda _: command)
         counted = round(_SETTLING / PLAN_DT)
         velocity = stride_velocity(self._robot, rollout.state)[counted:]
-        return Point(command, velocity, normalized_return(rollout), rollout.fell)
+        effort = effort_metrics(rollout, self._robot)
+        return Point(
+            command=command,
+            velocities=velocity,
+            normalized_return=normalized_return(rollout),
+            cost_of_transport=effort["cost_of_transport"],
+            fell=rollout.fell,
+        )
 
     def _steps(self, label: str, within: CommandRange, seed: int) -> dict[str, Any]:
         changed = round(_POINT / 2 / PLAN_DT)
@@ -309,9 +333,12 @@ def overall(labels: dict[str, dict[str, Any]]) -> dict[str, Any]:
     def of(name: str) -> list[float]:
         return [f[name] for f in labels.values() if f[name] is not None]
 
-    weights = np.array([len(figures["points"]) for figures in labels.values()])
+    known = [f for f in labels.values() if f["velocity_rmse_mps"] is not None]
+    weights = [len(f["points"]) for f in known]
     result: dict[str, Any] = {
-        name: float(np.sqrt(np.square(of(name)) @ weights / weights.sum()))
+        name: float(np.sqrt(np.average(np.square(of(name)), weights=weights)))
+        if known
+        else None
         for name in ("velocity_rmse_mps", "yaw_rate_rmse_radps")
     }
     for name in (
