@@ -34,6 +34,8 @@ class Options:
     """Parts of the names of kinds. Default: all."""
     processes: int = 2
     """Inputs of each kind that a process of its own gets, too, for comparison."""
+    again: bool = False
+    """Tries those again that did what they must not; for a mended product."""
     anew: bool = False
     """Does not go on with the record, but writes a new one."""
 
@@ -74,6 +76,8 @@ def fuzz(options: Options) -> int:
         for line in record.read_text().splitlines():
             row = json.loads(line)
             done[row["kind"], row["index"], row["what"]] = row
+    if options.again:
+        done = {key: row for key, row in done.items() if row["verdict"] != "BAD"}
     rows = []
     start = time.monotonic()
     with Fuzzer(options.keep) as fuzzer, record.open("a") as file:

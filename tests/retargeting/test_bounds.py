@@ -1,7 +1,7 @@
 """Results are looked at: what is outside its bounds is said; what is good is not."""
 
 import re
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from math import inf
 
 import numpy as np
@@ -77,6 +77,16 @@ def swimming(clip):
     return replace(clip, toes=toes)
 
 
+def frozen(clip):
+    """One frame over and over, as of a tracker that stopped."""
+    first = {
+        field.name: np.repeat(value[:1], len(clip), axis=0)
+        for field in fields(clip)
+        if isinstance(value := getattr(clip, field.name), np.ndarray)
+    }
+    return replace(clip, **first)
+
+
 def sits_at_first(clip):
     hip, toes = clip.hip.copy(), clip.toes.copy()
     hip[:60, 2] = 0.08
@@ -102,6 +112,7 @@ def test_body_of_another_size_than_its_source_has_is_warned_of(tmp_path):
         (exchanged, "left toes from its right ones -60 mm, not at least 0 mm"),
         (wide_and_exchanged, r"toes in their place 0 %, not at least 75 %"),
         (swimming, "correction"),
+        (frozen, r"speed ratio 0, not 0\.01 to 1"),
         (sits_at_first, r"frames on its feet 50 % \(60-120\), not at least 95 %"),
     ],
 )
