@@ -123,7 +123,8 @@ def load_into(module: torch.nn.Module, tensors: dict[str, Tensor], path: Path) -
     """Copies ``tensors`` into ``module``.
 
     Raises:
-        InputError: unless names, shapes and types are the module's.
+        InputError: unless names, shapes and types are the module's, and no matrix is
+            zero.
     """
     _check_fit(module, tensors, path)
     module.load_state_dict(tensors)
@@ -171,7 +172,7 @@ def build_network(
     Allocates memory only after the shapes have been compared with the file.
 
     Raises:
-        InputError: if it cannot be built, or the weights do not fit.
+        InputError: if it cannot be built, or the weights do not fit or are zero.
     """
     try:
         with torch.device("meta"):
@@ -228,6 +229,10 @@ def _check_fit(module: torch.nn.Module, tensors: dict[str, Tensor], path: Path) 
         raise InputError(
             f"The weights in {path} do not fit the network that their header describes."
         )
+    for name, _ in module.named_parameters():
+        # A vector may be zero, as biases are at first.
+        if tensors[name].dim() > 1 and not tensors[name].any():
+            raise InputError(f"{path} is damaged: {quoted(name)} is zero throughout.")
 
 
 def _content_sha256(header: dict[str, Any], tensors: dict[str, Tensor]) -> str:

@@ -276,3 +276,17 @@ def test_other_tensors_are_refused(tmp_path, tensors):
     write_linear(path, tensors)
     with pytest.raises(InputError, match="do not fit the network"):
         load_network(path, "linear", Linear, LinearConfig)
+
+
+def test_a_matrix_of_zeros_is_refused_and_a_vector_of_zeros_is_not(tmp_path):
+    """Biases are zero at first; a network without a layer does nothing."""
+    path = tmp_path / "w.safetensors"
+    write_linear(path, {"bias": torch.zeros(2)})
+    load_network(path, "linear", Linear, LinearConfig)
+    write_linear(path, {"weight": torch.zeros(2, 3)})
+    with pytest.raises(InputError, match="'weight' is zero throughout"):
+        load_network(path, "linear", Linear, LinearConfig)
+    layer = torch.nn.Linear(2, 2)
+    tensors = {**layer.state_dict(), "weight": torch.zeros(2, 2)}
+    with pytest.raises(InputError, match="'weight' is zero throughout"):
+        load_into(layer, tensors, path)

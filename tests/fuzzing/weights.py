@@ -153,7 +153,8 @@ def _tensors(header: dict[str, Any], body: bytes, random: Random) -> Iterator[Da
             legal = abs(float(change)) < 1e6
             yield Damage(f"{name}: {what} once", new_file, legal=legal)
         data = body[:start] + bytes(end - start) + body[end:]
-        yield Damage(f"{name}: all zero", _weights(header, data), legal=True)
+        legal = len(own["shape"]) < 2 or name.startswith("optimizer/")
+        yield Damage(f"{name}: all zero", _weights(header, data), legal=legal)
         for kind in ("F64", "F16", "I64", "U8", "F32"):
             if kind == own["dtype"]:
                 continue
