@@ -9,7 +9,7 @@ from loco_drake.cli.output import tracked
 from loco_drake.motion.gaits import parse_label
 
 if TYPE_CHECKING:
-    from loco_drake.evaluation.steering_table import Course
+    from loco_drake.evaluation.steering_courses import Course
     from loco_drake.systems.scenario import Scenario
 
 
@@ -42,7 +42,7 @@ class EvaluateSteering(Evaluation):
     def _courses(self, name: str) -> "tuple[Scenario, list[Course]]":
         """Returns what to simulate for a robot."""
         from loco_drake.control.actor import load_actor
-        from loco_drake.evaluation.steering_table import Course
+        from loco_drake.evaluation.steering_courses import Course
         from loco_drake.models.robots import get_robot
         from loco_drake.models.shipped import policy_path
         from loco_drake.systems.scenario import (

@@ -13,9 +13,7 @@ A label's figures are those of :mod:`loco_drake.evaluation.steering`:
 * *Drives* are 60 s of commands drawn within the range, another every 2 s.
 """
 
-import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -34,6 +32,13 @@ from loco_drake.evaluation.steering import (
     robot_latency,
     stride_velocity,
 )
+from loco_drake.evaluation.steering_courses import (
+    Course,
+    Point,
+    grid,
+    keeps_goals,
+    steps,
+)
 from loco_drake.evaluation.tracking import (
     Recorder,
     Rollout,
@@ -51,60 +56,11 @@ from loco_drake.motion.quality import (
 )
 from loco_drake.systems.scenario import Scenario
 
-VELOCITY_GOAL, YAW_RATE_GOAL = 0.11, 0.12  # m/s, rad/s
 _POINT, _SETTLING = 6.0, 2.0  # s
 _DRIVE, _CHANGE = 60.0, 2.0  # s
 # Distances between the points of the search, and the farthest ones.
 _SEARCH = ((0.25, -1.0, 3.0), (0.1, -0.5, 0.5), (0.25, -1.5, 1.5))
 _SHRINK, _TRIES = 0.85, 8
-# At least so much of an axis is worth a point, m/s or rad/s.
-_LEAST = 0.02
-
-
-def keeps_goals(errors: Sequence[Array]) -> bool:
-    """Returns whether errors (N, 3) of points are within the goals, all together."""
-    velocity, yaw_rate = rmse(errors)
-    if velocity is None or yaw_rate is None:
-        return False
-    return velocity <= VELOCITY_GOAL and yaw_rate <= YAW_RATE_GOAL
-
-
-@dataclass(frozen=True)
-class Point:
-    """The result of one command."""
-
-    command: Array  # shape (3,)
-    velocities: Array  # over a stride, of the samples that count, shape (N, 3)
-    normalized_return: float
-    cost_of_transport: float
-    fell: bool
-
-    @property
-    def errors(self) -> Array:
-        """Difference of the velocities from the command, shape (N, 3)."""
-        return self.velocities - self.command
-
-    @property
-    def velocity(self) -> list[float] | None:
-        """Mean velocity, shape (3,), or None if the robot fell before it counts."""
-        if not len(self.velocities):
-            return None
-        mean: list[float] = self.velocities.mean(axis=0).tolist()
-        return mean
-
-    @property
-    def is_good(self) -> bool:
-        """Whether the robot stands and keeps the goals."""
-        return not self.fell and keeps_goals([self.errors])
-
-
-@dataclass(frozen=True)
-class Course:
-    """What to measure of a label."""
-
-    label: str
-    seeds: Sequence[int]  # of the drives; the first is that of the rest
-    range: CommandRange | None = None  # None to search for it
 
 
 class _Driver:
@@ -281,33 +237,6 @@ class _Driver:
             "stretch": float(np.mean([stretch(r) for r in rollouts])),
             "drives": len(drives),
         }
-
-
-def grid(within: CommandRange) -> list[Array]:
-    """Returns the commands of the grid: the middle, points on the axes, the corners."""
-    low, high, middle = np.array(within.low), np.array(within.high), within.middle
-    wide = high - low > _LEAST
-    points = [middle]
-    for axis in np.flatnonzero(wide):
-        for share in (0.0, 0.25, 0.75, 1.0):
-            point = middle.copy()
-            point[axis] = low[axis] + share * (high[axis] - low[axis])
-            points.append(point)
-    sides = [
-        (low[axis], high[axis]) if wide[axis] else (middle[axis],) for axis in range(3)
-    ]
-    return points + [np.array(corner) for corner in itertools.product(*sides)]
-
-
-def steps(within: CommandRange) -> Iterator[tuple[Array, Array]]:
-    """Yields the commands before and after each step."""
-    middle = within.middle
-    for axis, end in itertools.product((0, 2), (within.low, within.high)):
-        there = middle.copy()
-        there[axis] = end[axis]
-        if abs(there[axis] - middle[axis]) >= _LEAST:
-            yield middle, there
-            yield there, middle
 
 
 def _step(before: Array, after: Array, changed: int, sample: int) -> Array:

@@ -13,7 +13,8 @@ from loco_drake.evaluation.steering import (
     stride_of,
     stride_velocity,
 )
-from loco_drake.evaluation.steering_table import grid, overall, steps
+from loco_drake.evaluation.steering_courses import grid, steps
+from loco_drake.evaluation.steering_table import overall
 from tests.synthetic_motion import synthetic_motion
 
 BOX = CommandRange((-0.5, -0.3, -1.0), (2.0, 0.3, 1.0))
