@@ -99,6 +99,8 @@ def load_drive(path: Path) -> Drive:
         for name, kind in _FIELDS.items():
             if type(header.get(name)) is not kind:
                 raise InputError(f"its header lacks {name}.")
+        if header.get("columns") != list(COLUMNS):
+            raise InputError(f"its columns must be {', '.join(COLUMNS)}.")
         table = _table(content)
     except (InputError, TypeError, ValueError, RecursionError) as error:
         reason = str(error) if isinstance(error, InputError) else "a row is amiss."

@@ -98,6 +98,16 @@ def test_a_header_must_be_complete(path, name):
         save_drive(path, TABLE, **HEADER)
 
 
+@pytest.mark.parametrize("change", [lambda names: names[::-1], lambda names: None])
+def test_other_columns_are_refused(path, change):
+    """Speeds in another order would be driven as they stand."""
+    header = header_of(path)
+    row = '[0, 1, 0, 0, "dog-trot", 0, 0]'
+    write(path, {**header, "columns": change(header["columns"])}, [row])
+    with pytest.raises(InputError, match="its columns must be time, forward, sideways"):
+        load_drive(path)
+
+
 def test_foreign_and_newer_files_are_refused(path):
     write(path, {**header_of(path), "schema_version": 2}, ["[]"])
     with pytest.raises(InputError, match=r"has the schema '2'; this .* reads 1"):

@@ -53,7 +53,9 @@ def _lines(header: Any, rows: list[str]) -> bytes:
 def _signed(what: str, header: Any, rows: list[str]) -> Damage:
     """Returns a drive whose hash fits."""
     from loco_drake.common.files import content_sha256
+    from loco_drake.control.driving import COLUMNS
 
     full = {key: value for key, value in header.items() if key != CHECKSUM}
     full[CHECKSUM] = content_sha256(full, {"rows": "\n".join(rows).encode()})
-    return Damage(f"signed, {what}", _lines(full, rows), legal=True)
+    legal = header.get("columns") == list(COLUMNS)
+    return Damage(f"signed, {what}", _lines(full, rows), legal=legal)
