@@ -113,7 +113,7 @@ def test_main_guard_keeps_imports_free_of_work(path):
     """Worker processes import the script again, so only the guard may do work."""
     *statements, guard = ast.parse(path.read_text()).body
     assert ast.unparse(guard).startswith("if __name__ == '__main__':")
-    allowed = (ast.Import, ast.ImportFrom, ast.FunctionDef, ast.Assign)
+    allowed = (ast.Import, ast.ImportFrom, ast.FunctionDef, ast.ClassDef, ast.Assign)
     docstring, *others = statements
     assert isinstance(docstring.value.value, str)
     assert all(isinstance(statement, allowed) for statement in others)
