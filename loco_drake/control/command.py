@@ -3,6 +3,7 @@
 The heading frame has the heading of the base and its z axis up.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -30,12 +31,16 @@ class CommandRange:
         """Returns the nearest command of the box, shape (3,)."""
         return np.clip(command, self.low, self.high)
 
-    def scaled(self, share: float) -> "CommandRange":
-        """Returns the box with each side shortened to this share about the middle."""
-        half = share * (np.array(self.high) - self.middle)
-        return CommandRange(
-            tuple((self.middle - half).tolist()), tuple((self.middle + half).tolist())
-        )
+    def scaled(self, shares: Sequence[float]) -> "CommandRange":
+        """Returns the box with its sides shortened about the middle, to hundredths.
+
+        Args:
+            shares: share of each side that remains, shape (3,).
+        """
+        half = np.array(shares) * (np.array(self.high) - self.middle)
+        low = np.ceil(np.round(100 * (self.middle - half), 6)) / 100
+        high = np.floor(np.round(100 * (self.middle + half), 6)) / 100
+        return CommandRange(tuple(low.tolist()), tuple(high.tolist()))
 
     def figures(self) -> dict[str, list[float]]:
         """Returns lowest and highest value of each axis by name."""

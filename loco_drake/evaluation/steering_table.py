@@ -18,6 +18,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from loco_drake.common.arrays import Array
 from loco_drake.common.parallel import map_in_workers
@@ -58,9 +59,19 @@ from loco_drake.systems.scenario import Scenario
 
 _POINT, _SETTLING = 6.0, 2.0  # s
 _DRIVE, _CHANGE = 60.0, 2.0  # s
-# Distances between the points of the search, and the farthest ones.
-_SEARCH = ((0.25, -1.0, 3.0), (0.1, -0.5, 0.5), (0.25, -1.5, 1.5))
-_SHRINK, _TRIES = 0.85, 8
+# Points of the search, m/s and rad/s; sideways and turning are tried to both sides.
+_FORWARD_STEP = 0.25
+_SIDES = ((1, (0.1, 0.2, 0.3, 0.4)), (2, (0.25, 0.5, 0.75, 1.0, 1.25)))
+# Shares of forward velocity, and of sideways velocity and yaw rate, that are tried.
+_SHRINK = (
+    (1.0, 1.0),
+    (1.0, 0.75),
+    (0.9, 0.6),
+    (0.8, 0.5),
+    (0.7, 0.4),
+    (0.6, 0.3),
+    (0.4, 0.2),
+)
 
 
 class _Driver:
@@ -98,26 +109,34 @@ class _Driver:
         }
 
     def _search(self, label: str, seed: int) -> CommandRange:
-        pace = self._pace(label, seed)
-        low, high = pace * [1.0, 0.0, 0.0], pace * [1.0, 0.0, 0.0]
-        for axis, (step, least, most) in enumerate(_SEARCH):
-            middle = (low + high) / 2
-            multiples = np.arange(np.ceil(least / step), most / step + 1e-9) * step
-            below = [x for x in multiples[::-1] if x < middle[axis]]
-            above = [x for x in multiples if x > middle[axis]]
-            for values, end in ((below, low), (above, high)):
-                for value in values:
-                    command = middle.copy()
-                    command[axis] = value
-                    if not self._point(label, command, seed).is_good:
-                        break
-                    end[axis] = value
-        within = CommandRange(tuple(low.tolist()), tuple(high.tolist()))
-        for _ in range(_TRIES):
+        pace = round(float(self._pace(label, seed)[0]), 2)
+        low, high = np.array([pace, 0.0, 0.0]), np.array([pace, 0.0, 0.0])
+        forward = np.arange(-4, 13) * _FORWARD_STEP
+        for values, end in (
+            (forward[forward < pace][::-1], low),
+            (forward[forward > pace], high),
+        ):
+            for value in values:
+                if not self._is_good(label, [value, 0.0, 0.0], seed):
+                    break
+                end[0] = value
+        middle = (low + high) / 2
+        for axis, steps_of_axis in _SIDES:
+            for value in steps_of_axis:
+                there = [middle.copy(), middle.copy()]
+                there[0][axis], there[1][axis] = value, -value
+                if not all(self._is_good(label, c, seed) for c in there):
+                    break
+                low[axis], high[axis] = -value, value
+        widest = CommandRange(tuple(low.tolist()), tuple(high.tolist()))
+        for along, across in _SHRINK:
+            within = widest.scaled((along, across, across))
             if self._keeps_goals(label, within, seed):
                 break
-            within = within.scaled(_SHRINK)
         return within
+
+    def _is_good(self, label: str, command: ArrayLike, seed: int) -> bool:
+        return self._point(label, np.array(command, dtype=np.float64), seed).is_good
 
     def _keeps_goals(self, label: str, within: CommandRange, seed: int) -> bool:
         """Returns whether the whole grid keeps the goals without a fall."""

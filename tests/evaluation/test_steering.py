@@ -109,8 +109,9 @@ def test_steps_go_to_both_ends_of_speed_and_turning_and_back():
 
 def test_a_range_is_clipped_scaled_and_written():
     np.testing.assert_array_equal(BOX.clip(np.array([3.0, 0.1, -9])), [2.0, 0.1, -1])
-    half = BOX.scaled(0.5)
-    assert half.low == (0.125, -0.15, -0.5)
+    half = BOX.scaled((0.5, 0.5, 0.25))
+    assert half.low == (0.13, -0.15, -0.25)  # .125 rounded inward
+    assert half.high == (1.37, 0.15, 0.25)
     assert CommandRange.of_figures(BOX.figures()) == BOX
     assert BOX.figures()["forward_mps"] == [-0.5, 2.0]
     assert (np.abs(ANY_COMMAND.low) >= np.abs(BOX.low)).all()
