@@ -7,6 +7,7 @@ need Chromium on the path (``chromium``, headless), `retargeting` the recordings
     python docs/draw.py retargeting docs/images/retargeting.png --html replay.html
     python docs/draw.py gait-change docs/images/gait_change.png
     python docs/draw.py library docs/images/library.png
+    python docs/draw.py steering docs/images
 
 ``loco-drake evaluate ... --figures`` draws the others.
 """
@@ -24,24 +25,31 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from loco_drake.cli.output import write_figure
-from loco_drake.common.files import atomic_path
+from loco_drake.common.files import atomic_path, read_json
 from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments, select_labels
 from loco_drake.evaluation.dataset_picture import describe, library_figure
 from loco_drake.evaluation.gait_change import change_figure
+from loco_drake.evaluation.steering_pictures import grid_figure, steering_figures
 from loco_drake.evaluation.tracking import Recorder, dress
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.ground import AddGround
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS, AddRobotModel, get_robot
+from loco_drake.models.shipped import results_path
 from loco_drake.motion.gaits import LABELS, parse_schedule
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.motion_file import load_motion
 from loco_drake.retargeting.retarget import retarget_clip
 from loco_drake.retargeting.scaling import resample
 from loco_drake.systems.keypoint_visualizer import COLORS, NAMES
-from loco_drake.systems.scenario import GeneratedReference, Scenario, TrainedPolicy
+from loco_drake.systems.scenario import (
+    GeneratedReference,
+    Scenario,
+    SteeringConfig,
+    TrainedPolicy,
+)
 
 Png = tyro.conf.Positional[Path]
 
@@ -188,6 +196,37 @@ def library(png: Png, motions: Path = Path("motions/go2")) -> None:
     write_figure(library_figure(points, title), png, dpi=80)
 
 
+def steering(
+    folder: Path = Path("docs/images"),
+    robot: str = "go2",
+    gait: str = "mpc-trot",
+    seed: int = 0,
+    results: Path | None = None,
+) -> None:
+    """A robot that follows commands: errors over the grid, a drive, a figure of eight.
+
+    Args:
+        folder: of the pictures.
+        robot: go2 or a1.
+        gait: of the drive and of the figure of eight.
+        seed: of the drive.
+        results: of ``loco-drake evaluate steering``; the shipped ones by default.
+    """
+    found = read_json(results or results_path(f"steering-{robot}"))
+    scenario = Scenario(
+        robot=robot,
+        reference=GeneratedReference(gait=gait, duration=60.0),
+        steering=SteeringConfig(measured_ranges=False),
+        policy=TrainedPolicy(),
+    )
+    chosen = {**found, "labels": {gait: found["labels"][gait]}}
+    pictures = dict(steering_figures(scenario, chosen, seed))
+    pictures["grid"] = grid_figure(robot, found)
+    for title, picture in pictures.items():
+        name = f"steering_{robot}_{title.removeprefix(f'{gait}-')}.png"
+        write_figure(picture, folder / name, dpi=80)
+
+
 def take_picture(meshcat: Meshcat, png: Path, size: tuple[int, int]) -> None:
     """Writes a picture of what Meshcat shows, ``size`` pixels wide and high."""
     png.parent.mkdir(parents=True, exist_ok=True)
@@ -204,5 +243,11 @@ def take_picture(meshcat: Meshcat, png: Path, size: tuple[int, int]) -> None:
 
 
 if __name__ == "__main__":
-    pictures = {"robot": robot, "retargeting": retargeting, "library": library}
-    tyro.extras.subcommand_cli_from_dict({**pictures, "gait-change": gait_change})
+    pictures = {
+        "robot": robot,
+        "retargeting": retargeting,
+        "gait-change": gait_change,
+        "library": library,
+        "steering": steering,
+    }
+    tyro.extras.subcommand_cli_from_dict(pictures)

@@ -58,6 +58,46 @@ def tracking(robot="go2", **changes):
     }
 
 
+STEERED = ("dog-trot", "mpc-trot")
+
+
+def steering(robot="go2", **changes):
+    """Two gaits, with the middle and one end of their grid; changes are of all alike.
+
+    Errors are .06 and .10 m/s, ranges the same.
+    """
+    points = [
+        {"command": [0.75, 0.0, 0.0], "velocity": [0.78, 0.04, 0.01], "fell": False},
+        {"command": [2.0, 0.0, 0.0], "velocity": None, "fell": True},
+    ]
+    figures = {
+        "velocity_rmse_mps": 0.082,
+        "yaw_rate_rmse_radps": 0.05,
+        "latency_reference_s": 0.26,
+        "latency_robot_s": 0.9,
+        "fall_rate": 0.03,
+        "normalized_return": 88.0,
+        "stretch": 1.01,
+        "distance_from_plan_max_m": 0.31,
+        "stance_slip_median_mps": 0.04,
+        "plan_slip_median_mps": 0.011,
+        "plan_penetration_max_m": 0.0017,
+        "plan_joint_limit_violations": 0,
+        **changes,
+    }
+    ends = {
+        "forward_mps": [-0.5, 2.0],
+        "sideways_mps": [-0.3, 0.3],
+        "yaw_rate_radps": [-1.0, 0.9],
+    }
+    own = {"range": ends, "points": points, "steps": 8, "steps_covered": 7, "drives": 2}
+    labels = {
+        label: {**figures, **own, "velocity_rmse_mps": error}
+        for label, error in zip(STEERED, (0.06, 0.10), strict=True)
+    }
+    return {"robot": robot, "labels": labels, "all": figures}
+
+
 def learning(robot="go2"):
     curve = {
         "steps": [1000, 2000, 4_500_000],

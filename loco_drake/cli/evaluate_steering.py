@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loco_drake.cli.evaluation import Evaluation, print_by_label
-from loco_drake.cli.output import tracked
+from loco_drake.cli.evaluation import Evaluation, print_by_label, say_of
+from loco_drake.cli.output import tracked, write_figure
 from loco_drake.motion.gaits import parse_label
 
 if TYPE_CHECKING:
@@ -29,6 +29,9 @@ class EvaluateSteering(Evaluation):
     # Weights of the policy, or the name of a shipped variant, such as randomized.
     # Default: the robot's main policy.
     policy: Path | None = None
+    # Folder for pictures: errors over the grid; of each gait the response to commands
+    # and a figure of eight.
+    figures: Path | None = None
 
     def of_robots(self, names: list[str]) -> dict[str, Any]:
         """Returns the figures of one robot, or of all by name.
@@ -79,16 +82,19 @@ class EvaluateSteering(Evaluation):
         return {"robot": name, "labels": labels, "all": overall(labels)}
 
     def show(self, name: str, figures: dict[str, Any]) -> int:
-        """Prints a table of all labels; returns 0."""
+        """Prints tables of all labels, and draws the pictures; returns 0."""
         rows = {**figures["labels"], "all of these": figures["all"]}
         print_by_label(f"{name}, steered", ["steering"], rows)
-        ranges = {
-            label: {**of_label, "range": _ends(of_label["range"])}
-            for label, of_label in figures["labels"].items()
-        }
-        print_by_label(f"{name}, ranges of the commands", ["steering_range"], ranges)
+        title = f"{name}, ranges of the commands"
+        print_by_label(title, ["steering_range"], figures["labels"])
+        if self.figures is not None:
+            self._draw(self.figures, name, figures)
         return 0
 
+    def _draw(self, folder: Path, name: str, figures: dict[str, Any]) -> None:
+        from loco_drake.evaluation.steering_pictures import steering_figures
 
-def _ends(ranges: dict[str, list[float]]) -> dict[str, dict[str, float]]:
-    return {axis: {"low": low, "high": high} for axis, (low, high) in ranges.items()}
+        say_of(name)("Drawing")
+        scenario, _ = self._courses(name)
+        for title, picture in steering_figures(scenario, figures, self.seed):
+            write_figure(picture, folder / f"{name}-{title}.png")

@@ -12,7 +12,7 @@ import numpy as np
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 
-_AXES = ("forward_mps", "sideways_mps", "yaw_rate_radps")
+AXES = ("forward_mps", "sideways_mps", "yaw_rate_radps")
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,12 @@ class CommandRange:
     def figures(self) -> dict[str, list[float]]:
         """Returns lowest and highest value of each axis by name."""
         ends = zip(self.low, self.high, strict=True)
-        return {axis: list(pair) for axis, pair in zip(_AXES, ends, strict=True)}
+        return {axis: list(pair) for axis, pair in zip(AXES, ends, strict=True)}
 
     @classmethod
     def of_figures(cls, figures: dict[str, list[float]]) -> Self:
         """Returns the box that :meth:`figures` described."""
-        low, high = zip(*(figures[axis] for axis in _AXES), strict=True)
+        low, high = zip(*(figures[axis] for axis in AXES), strict=True)
         return cls(low, high)
 
 

@@ -11,6 +11,7 @@ from loco_drake.evaluation.report.results import results_dir
 from tests.report_results import (
     learning,
     retargeting,
+    steering,
     tokenizer,
     tracking,
     write_results,
@@ -56,6 +57,7 @@ def made(tmp_path_factory):
         tracking_go2_lagged=tracking(normalized_return=55.5, stretch=1.0),
         tracking_go2_randomized=tracking(normalized_return=44.4, fall_rate=0.25),
         learning_go2=learning(),
+        steering_go2=steering(),
     )
     return make(folder, "--results", results, "--replays", "none")
 
@@ -103,10 +105,22 @@ def test_a_policy_is_shown_in_both_worlds_side_by_side(made):
     assert cells[7:10] == ["44.4", "1.021", "25"]
 
 
+def test_steering_shows_errors_beside_the_ranges_and_a_map(made):
+    page, _ = made
+    part = section(page, "steering")
+    assert row(part, "mpc-trot")[1:3] == ["0.100", "0.050"]
+    assert row(part, "mpc-trot", 1)[1:7] == [
+        "-0.50", "2.00", "-0.30", "0.30", "-1.00", "0.90"
+    ]  # fmt: skip
+    assert "off the command at each point of the grid, for 2 gaits" in part
+    assert "loco-drake evaluate steering --robot go2" in part
+    assert "--robot a1" not in part
+
+
 def test_pictures_say_what_they_show(made):
     page, _ = made
     pictures = re.findall(r'<svg[^>]*role="img"[^>]*>', page)
-    assert len(pictures) == len(re.findall("<svg", page)) == 4
+    assert len(pictures) == len(re.findall("<svg", page)) == 5
     assert "at the end go2 dog 61, go2 solo8 93" in section(page, "figure-3")
     strips = section(page, "figure-1")
     assert strips.count("solo8-wave") >= 1

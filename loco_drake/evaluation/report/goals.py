@@ -6,7 +6,9 @@ from math import inf
 from loco_drake.evaluation.report.content import CONTENT, Figure, Goal
 from loco_drake.evaluation.report.results import Figures, Results
 from loco_drake.models.robots import ROBOTS
+from loco_drake.motion.gaits import LABELS
 
+_LABELS = frozenset(map(str, LABELS))
 MET, BEST, MISSED, UNKNOWN = "met", "dream met", "missed", "not measured"
 
 
@@ -102,12 +104,10 @@ def _read(
         pick = max if highest else min
         found = within.extreme(pick, last, *path[: path.index("*")])
         return found and Measured(figure.factor * found[0], notes=(found[1],))
-    if last.endswith("[-1]"):
-        values = within.numbers(*path, last.removesuffix("[-1]"))
-        ended = values[-1] if values else None
-        return None if ended is None else Measured(figure.factor * ended)
     for key in path:
-        if within.values.get(key, "") is None:
+        # A gait that was not evaluated is no damage.
+        otherwise = None if key in _LABELS else ""
+        if within.values.get(key, otherwise) is None:
             return None
         within = within.part(key)
     return read_measured(within, last, figure.factor)
@@ -115,7 +115,7 @@ def _read(
 
 def read_measured(figures: Figures, key: str, factor: float) -> Measured | None:
     """Returns a figure, None if it is null; a mean with the ends of its interval."""
-    value = figures.required(key)
+    value = figures.entry(key) if key.endswith("]") else figures.required(key)
     low, high = (
         figures.required(end) if key == "mean" else None for end in ("low", "high")
     )

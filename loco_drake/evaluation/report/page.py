@@ -112,6 +112,7 @@ def of_results(results: Results) -> dict[str, Any]:
         for robot, figures in results.of_robots("learning").items()
         if figures.numbers("learning", "steps")
     }
+    steering = results.of_robots("steering")
     return {
         "goals": goals,
         "counts": counts(goals),
@@ -124,6 +125,11 @@ def of_results(results: Results) -> dict[str, Any]:
             robot: pictures.confusion_picture(figures, "transformer")
             for robot, figures in generation.items()
             if figures.values.get("confusion") is not None
+        },
+        "grids": {
+            robot: pictures.grid_picture(figures)
+            for robot, figures in steering.items()
+            if figures.part("labels").values
         },
         "returns": pictures.returns_picture(tracking) if tracking else None,
         "learning": pictures.learning_picture(learning) if learning else None,

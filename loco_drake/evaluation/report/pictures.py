@@ -20,6 +20,7 @@ from loco_drake.evaluation.generation_pictures import (
 from loco_drake.evaluation.report.content import CONTENT
 from loco_drake.evaluation.report.results import Figures
 from loco_drake.evaluation.report.tables import robot_title
+from loco_drake.evaluation.steering_grid import draw_grid, grid_errors
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS, SOURCES
 from loco_drake.motion.motion import Motion
@@ -186,6 +187,18 @@ def returns_picture(tracking: Mapping[str, Figures]) -> tuple[Figure, str]:
     axes.set_ylabel("normalized return, of 100")
     figure.legend(loc="outside upper right", ncols=3)
     return figure, "Normalized return of each gait; the table has the values."
+
+
+@_as_svg
+def grid_picture(figures: Figures) -> tuple[Figure, str]:
+    """Returns how far a steered robot is off each command of the grid, by gait."""
+    errors = grid_errors(figures)
+    figure = Figure(figsize=(11, 2.4 + 0.5 * len(errors)), layout="constrained")
+    draw_grid(figure, errors, ink=INK)
+    return figure, (
+        f"How far velocity and yaw rate are off the command at each point of the grid, "
+        f"for {len(errors)} gaits; the tables have the errors of all points together."
+    )
 
 
 @_as_svg

@@ -136,6 +136,46 @@ class Figures:
         named = Figures({str(k): v for k, v in enumerate(values)}, self.origin)
         return list(map(named.number, named.values))
 
+    def entry(self, key: str) -> float | None:
+        """Returns a figure, or entry k of the list ``name`` for the key "name[k]".
+
+        It is None where :meth:`number` is, and of an empty list.
+        """
+        name, _, index = key.removesuffix("]").partition("[")
+        if not index:
+            return self.number(name)
+        values = self.numbers(name)
+        if not values:
+            return None
+        if not -len(values) <= int(index) < len(values):
+            raise self.damaged(f"{name} has no entry {index}")
+        return values[int(index)]
+
+    def objects(self, key: str) -> list["Figures"]:
+        """Returns the objects of the list that is called ``key``."""
+        values = self.values.get(key)
+        if not isinstance(values, list):
+            raise self.damaged(f"{key} is no list")
+        if not all(isinstance(value, dict) for value in values):
+            raise self.damaged(f"{key} has an entry that is no object")
+        return [Figures(value, self.origin) for value in values]
+
+    def vector(self, key: str, size: int) -> Array | None:
+        """Returns the list of ``size`` numbers that is called ``key``, or None."""
+        if self.values.get(key) is None:
+            return None
+        values = self.numbers(key)
+        if len(values) != size or None in values:
+            raise self.damaged(f"{key} is no list of {size} numbers")
+        return np.array(values, float)
+
+    def flag(self, key: str) -> bool:
+        """Returns whether ``key`` is true."""
+        value = self.values.get(key)
+        if not isinstance(value, bool):
+            raise self.damaged(f"{key} is {value!r}, not true or false")
+        return value
+
     def text(self, key: str) -> str:
         """Returns a string, empty where there is none."""
         value = self.values.get(key)

@@ -48,6 +48,8 @@ def all_tables(results: Results) -> dict[str, Any]:
         "realism": realism_table(generation) if generation else None,
         "generation": by_robot("generation", generation_table),
         "tracking": by_robot("tracking-generated", tracking_table),
+        "steering": by_robot("steering", steering_table),
+        "steering_range": by_robot("steering", steering_range_table),
         "robustness": robustness_table(results),
         "policies": policies_table(results),
     }
@@ -66,6 +68,20 @@ def tracking_table(robot: str, figures: Figures) -> Table:
     """Returns the figures of tracking, by label, and how they were measured."""
     columns = _COLUMNS["tracking"] + _COLUMNS["tracking_more"]
     return label_table(_by_gait(robot), columns, figures, conditions_text(figures))
+
+
+def steering_table(robot: str, figures: Figures) -> Table:
+    """Returns how a robot follows commands, by label, and the number of drives."""
+    counts = [own.number("drives") or 0.0 for _, own in figures.parts("labels")]
+    drives = max(counts, default=0.0)
+    note = f"Drives of each gait: {drives:.0f}." if drives else ""
+    return label_table(_by_gait(robot), _COLUMNS["steering"], figures, note)
+
+
+def steering_range_table(robot: str, figures: Figures) -> Table:
+    """Returns the ranges of the commands, by label, and how sound the plan is there."""
+    title = f"{robot_title(robot)}, ranges of the commands"
+    return label_table(title, _COLUMNS["steering_range"], figures)
 
 
 def tokenizer_table(robot: str, figures: Figures) -> Table:

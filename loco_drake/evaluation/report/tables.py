@@ -102,7 +102,7 @@ def column_cell(column: Column, figures: Figures, otherwise: str = "") -> Cell:
         part = part.part(key)
     if last == "mean":
         return figure_cell(read_measured(part, last, column.factor), column.digits)
-    value = part.number(last)
+    value = part.entry(last)
     if value is None:
         return Cell(NOTHING, reason=part.reason(last) or otherwise)
     return Cell(number(column.factor * value, column.digits))

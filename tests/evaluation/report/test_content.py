@@ -66,7 +66,7 @@ def test_texts_of_a_goal_have_the_numbers_of_its_bounds(name):
     """And a dream lies within the aim."""
     goal = GOALS[name]
     for bound in filter(None, (goal.aim, goal.dream)):
-        numbers = {float(text) for text in re.findall(r"\d*\.?\d+", str(bound))}
+        numbers = {float(text) for text in re.findall(r"-?\d*\.?\d+", str(bound))}
         bounds = {x for x in (bound.least, bound.most) if abs(x) < float("inf")}
         assert bounds
         assert bounds <= numbers

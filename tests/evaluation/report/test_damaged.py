@@ -11,7 +11,7 @@ from loco_drake.common.files import TIMES, figures_sha256
 from loco_drake.evaluation.report import pictures
 from loco_drake.evaluation.report.page import of_results
 from loco_drake.evaluation.report.results import load_results, results_dir
-from tests.report_results import learning, tokenizer, tracking
+from tests.report_results import learning, steering, tokenizer, tracking
 
 SHIPPED = sorted(path.name for path in results_dir().glob("*.json"))
 # What the hash leaves out, in bytes: a number or a list of numbers, or the hash.
@@ -61,7 +61,7 @@ def quick_pictures(monkeypatch):
 @pytest.mark.parametrize("name", SHIPPED)
 def test_any_value_that_is_wrong(name, tmp_path, monkeypatch):
     """Of what tables and goals are made of: each of 12 values, by each wrong one."""
-    for picture in ("confusion", "returns", "learning"):
+    for picture in ("confusion", "returns", "learning", "grid"):
         monkeypatch.setattr(pictures, f"{picture}_picture", lambda *_: "")
     content = json.loads((results_dir() / name).read_text())
     random = np.random.default_rng(0)
@@ -108,6 +108,38 @@ def test_values_of_another_kind_are_refused(name, path, wrong, tmp_path):
 
 
 @pytest.mark.parametrize(
+    "path",
+    [
+        ("labels", "dog-trot", "range"),
+        ("labels", "dog-trot", "range", "forward_mps"),
+        ("labels", "dog-trot", "points"),
+        ("labels", "dog-trot", "points", 0, "command"),
+        ("labels", "dog-trot", "points", 0, "velocity"),
+        ("labels", "dog-trot", "points", 0, "fell"),
+        ("labels", "mpc-trot", "drives"),
+        ("all", "latency_robot_s"),
+    ],
+)
+@pytest.mark.parametrize("wrong", ["x", [1.0, "x"], {"a": []}])
+def test_damage_of_steering_is_refused(path, wrong, tmp_path):
+    content = steering()
+    parent = content
+    for key in path[:-1]:
+        parent = parent[key]
+    parent[path[-1]] = wrong
+    assert refused(tmp_path, "steering-go2.json", content)
+    parent[path[-1]] = steering_at(path)
+    assert not refused(tmp_path, "steering-go2.json", content)
+
+
+def steering_at(path):
+    value = steering()
+    for key in path:
+        value = value[key]
+    return value
+
+
+@pytest.mark.parametrize(
     "written",
     [
         b"",
@@ -149,7 +181,7 @@ def test_labels_of_results_need_not_be_those_of_the_package(tmp_path):
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_flipped_digit_is_noticed(name, tmp_path, monkeypatch):
     """One digit of each of ten figures, but for times, becomes another."""
-    for picture in ("confusion", "returns", "learning"):
+    for picture in ("confusion", "returns", "learning", "grid"):
         monkeypatch.setattr(pictures, f"{picture}_picture", lambda *_: "")
     written = (results_dir() / name).read_bytes()
     assert said_of(tmp_path, name, written) is None
