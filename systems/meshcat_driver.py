@@ -11,11 +11,12 @@ from loco_drake.common.arrays import Array
 from loco_drake.control.driving import COMMAND, GAIT, ORDERS, PUSH, RESET
 from loco_drake.motion.gaits import LABELS, GaitLabel
 
-# Name, least, most, step, and the keys to go down and up. Of a command, in its order.
+# Name, least, most, step, and the keys to go down and up. Of a command, in its order,
+# m/s and rad/s. The page has room for fifteen letters.
 SLIDERS = (
-    ("forward m/s (W, S)", -1.5, 3.5, 0.1, "KeyS", "KeyW"),
-    ("sideways m/s (A, D)", -1.0, 1.0, 0.1, "KeyD", "KeyA"),
-    ("turning rad/s (Q, E)", -2.0, 2.0, 0.1, "KeyE", "KeyQ"),
+    ("forward (W, S)", -1.5, 3.5, 0.1, "KeyS", "KeyW"),
+    ("sideways (A, D)", -1.0, 1.0, 0.1, "KeyD", "KeyA"),
+    ("turn (Q, E)", -2.0, 2.0, 0.1, "KeyE", "KeyQ"),
 )
 HALT = "Halt (Space)"
 RESET_BUTTON = "Put upright (R)"
@@ -93,7 +94,7 @@ class MeshcatDriver:
         self.notes: tuple[str, ...] = ()
         for name, low, high, step, down, up in SLIDERS:
             meshcat.AddSlider(name, low, high, step, 0.0, down, up)
-        buttons = {**dict.fromkeys(map(str, labels), ""), **_KEYS}
+        buttons = {**_KEYS, **dict.fromkeys(map(str, labels), "")}
         for name, key in buttons.items():
             meshcat.AddButton(name, key)
         self._clicks = dict.fromkeys(buttons, 0)

@@ -23,15 +23,14 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def drive(tmp_path, weights):
+def drive(tmp_path):
     """Starts the command in another process; returns it and the page's address."""
     processes = []
 
     def start(*arguments):
         call = f"{HEAR_CTRL_C}from loco_drake.cli.main import main; exit(main())"
-        line = ["drive", "--policy", str(weights / "calm.safetensors"), *arguments]
         process = subprocess.Popen(
-            [sys.executable, "-c", call, *line],
+            [sys.executable, "-c", call, "drive", *arguments],
             cwd=tmp_path,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
