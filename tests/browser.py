@@ -121,7 +121,8 @@ class Browser:
         """Waits until a JavaScript expression is true in the page."""
         deadline = time.monotonic() + _LIMIT
         while not self.evaluate(expression):
-            assert time.monotonic() < deadline, expression
+            shown = self.evaluate("document.body.innerText.slice(-500)")
+            assert time.monotonic() < deadline, f"{expression}: {shown}"
             time.sleep(0.1)
 
     def press(self, code: str, times: int = 1) -> None:
