@@ -11,7 +11,6 @@ import pytest
 
 from loco_drake.cli.main import main
 from loco_drake.control.drive_file import load_drive
-from loco_drake.motion.gaits import LABELS, parse_label
 from loco_drake.systems.meshcat_driver import SLIDERS
 from tests.browser import Browser, find_browser
 from tests.process import HEAR_CTRL_C, LIMIT
@@ -51,12 +50,13 @@ def drive(tmp_path):
 
 @pytest.mark.skipif(find_browser() is None, reason="needs Chromium, and there is none")
 def test_keys_in_a_browser_drive_the_robot_and_the_page_shows_it(drive, tmp_path):
-    # A browser without a graphics card cannot draw 64 pictures a second.
+    # Without a graphics card drawing takes all of a machine's time.
     few = ("--overlay", "visualization: {publish_period: 0.125}")
     process, address = drive("--record", "a.drive", "--json", "a.json", *few)
     with Browser(find_browser(), tmp_path / "profile", (320, 240)) as browser:
         browser.open(address)
         browser.wait_for(f"globalThis.viewer?.gui_controllers[{FORWARD!r}] != null")
+        browser.evaluate("viewer.render = () => {}")
         browser.wait_for(f"{SHOWN}?.includes('command 0.00 and 0.00 m/s, 0.00 rad/s')")
         browser.press("KeyW", 6)
         browser.press("KeyD", 2)
@@ -78,7 +78,8 @@ def test_keys_in_a_browser_drive_the_robot_and_the_page_shows_it(drive, tmp_path
         browser.wait_for(f"{SHOWN}?.includes('command 0.00 and 0.00 m/s')")
         browser.wait_for(f"{SHOWN}?.includes('gamepad is gone')")
         browser.press("KeyR")
-        browser.wait_for(f"{SHOWN}?.includes('put upright')")
+        browser.press("KeyX")
+        browser.wait_for(f"{SHOWN}?.includes('dog-trot')")
         browser.press("Escape")
         printed, error = process.communicate(timeout=LIMIT)
     assert process.returncode == 0, error
@@ -88,8 +89,9 @@ def test_keys_in_a_browser_drive_the_robot_and_the_page_shows_it(drive, tmp_path
         assert value in rows[:, column]
     assert rows[:, 0].max() == 2.0
     np.testing.assert_array_equal(rows[0], [0, 0, 0, 1, 0, 0])
-    assert rows[-1, 3] == LABELS.index(parse_label("dog-pace"))
-    assert (rows[:, 4].max(), rows[-1, 5]) == (6.0, 1.0)
+    # Pace, and trot again.
+    assert set(rows[:, 3]) == {0, 1}
+    assert (rows[:, 4].max(), rows[:, 5].max()) == (6.0, 1.0)
     figures = json.loads((tmp_path / "a.json").read_text())
     assert 0.02 < figures["speed_mps"] < 2.0
     # Without the page, and as fast as it goes, it is the same drive.
