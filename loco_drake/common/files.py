@@ -186,6 +186,17 @@ def read_text(path: Path) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+def parse_number(text: str) -> float:
+    """Returns a number as tables write it; Python's ``1_0`` and other digits are none.
+
+    Raises:
+        ValueError: if it is no number.
+    """
+    if "_" in text or not text.isascii():
+        raise ValueError("no number")
+    return float(text)
+
+
 def is_inside(name: str) -> bool:
     """Says whether a relative path, written with ``/``, stays inside its folder.
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from loco_drake.common.arrays import Array, Integers
 from loco_drake.common.errors import InputError, check_number, quoted
-from loco_drake.common.files import read_text
+from loco_drake.common.files import parse_number, read_text
 from loco_drake.control.command import ANY_COMMAND
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.motion.gaits import LABELS, parse_label
@@ -165,7 +165,7 @@ def _number(name: str, text: str) -> float:
         InputError: if it is no finite number.
     """
     try:
-        value = float(text)
+        value = parse_number(text)
     except ValueError:
         value = float("nan")
     if not isfinite(value):

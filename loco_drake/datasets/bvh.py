@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
+from loco_drake.common.files import parse_number
 from loco_drake.datasets.recording import (
     LARGEST,
     parse_numbers,
@@ -158,7 +159,7 @@ def _header_value(line: str, name: str) -> float:
     label, _, text = line.partition(":")
     refuse_decimal_commas(f"{text} {text}")
     try:
-        value = float(text)
+        value = parse_number(text)
     except ValueError:
         value = 0.0
     if "".join(label.lower().split()) != name.lower().replace(" ", "") or not (

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from loco_drake.common.errors import InputError, check_choice
-from loco_drake.common.files import atomic_path, is_inside, read_text
+from loco_drake.common.files import atomic_path, is_inside, parse_number, read_text
 from loco_drake.datasets.recording import check_rate
 from loco_drake.datasets.registry import DATASETS, read_clip
 from loco_drake.motion.gaits import LABELS, GaitLabel
@@ -183,7 +183,7 @@ def read_segments(data_dir: Path) -> list[Segment]:
 
     Raises:
         InputError: if ``segments.csv`` is missing or damaged, a row cannot be or
-            repeats another, or none is of a source that can be read.
+            repeats another, or there is none of a source that can be read.
     """
     table = Path(data_dir) / "segments.csv"
     if not table.is_file():
@@ -208,9 +208,9 @@ def read_segments(data_dir: Path) -> list[Segment]:
                 source=sources[row["dataset"]],
                 path=Path(data_dir) / row["dataset"] / row["file"],
                 gait=row["gait"],
-                start=int(row["start_frame"]),
-                end=int(row["end_frame"]),
-                fps=float(row["fps"]),
+                start=_parse_frame(row["start_frame"]),
+                end=_parse_frame(row["end_frame"]),
+                fps=parse_number(row["fps"]),
             )
         except InputError as error:
             raise InputError(f"{table}: line {line} is invalid: {error}") from None
@@ -229,7 +229,14 @@ def read_segments(data_dir: Path) -> list[Segment]:
         if not segments:
             raise InputError(f"{text}, as are all.")
         logging.getLogger(__name__).warning("%s, and is left out.", text)
+    if not segments:
+        raise InputError(f"{table} lists no segments.")
     return segments
+
+
+def _parse_frame(text: str) -> int:
+    parse_number(text)
+    return int(text)
 
 
 def one_format(segments: Iterable[Segment]) -> list[Segment]:

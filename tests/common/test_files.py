@@ -9,7 +9,13 @@ import threading
 import pytest
 
 from loco_drake.common.errors import InputError, check_choice, check_name, quoted
-from loco_drake.common.files import atomic_path, cache_dir, check_writable, read_json
+from loco_drake.common.files import (
+    atomic_path,
+    cache_dir,
+    check_writable,
+    parse_number,
+    read_json,
+)
 
 
 def test_a_file_is_whole_or_as_it_was(tmp_path):
@@ -174,3 +180,11 @@ def test_names_are_short_printable_and_no_paths(name):
     assert check_name("robot", "my robot-2") == "my robot-2"
     with pytest.raises(InputError, match="A robot must have 1 to 64 printable"):
         check_name("robot", name)
+
+
+@pytest.mark.parametrize("text", ["1_0", "٣", "", "x", "1,5", "0x10"])
+def test_what_is_no_number_in_a_table_is_refused(text):
+    """Python's own function takes the first two, for 10 and for 3."""
+    assert parse_number(" -1.5e1 ") == -15.0
+    with pytest.raises(ValueError, match=r"number|to float"):
+        parse_number(text)

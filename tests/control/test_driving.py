@@ -84,6 +84,7 @@ HEAD = "time,forward,sideways,yaw_rate"
         (f"{HEAD},time\n", "its first line must name the columns"),
         (f"{HEAD}\n0,1,2\n", "line 2: There are 3 cells for 4 names"),
         (f"{HEAD}\n0,1,2,x\n", "line 2: The yaw_rate must be a finite number, not 'x'"),
+        (f"{HEAD}\n0,1_0,0,0\n", "line 2: The forward must be a finite number"),
         (f"{HEAD}\n0,nan,0,0\n", "line 2: The forward must be a finite number"),
         (f"{HEAD}\n0,0,inf,0\n", "line 2: The sideways must be a finite number"),
         (f"{HEAD}\n0,0,0,0\n1,9,0,0\n", "line 3: A command's forward .* -4 to 4"),

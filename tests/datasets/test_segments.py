@@ -38,6 +38,10 @@ def test_segment_reads_its_own_frames(made_data):
     [
         (HEADER + "dog_mann,a.txt,trot,10\n", "line 2 lacks end_frame, fps"),
         (HEADER + "dog_mann,a.txt,trot,x,70,60,1,\n", "line 2 has frames or a rate"),
+        (HEADER + "dog_mann,a.txt,trot,1_0,70,60,1,\n", "line 2 has frames or a rate"),
+        (HEADER + "dog_mann,a.txt,trot,1,70,6_0,1,\n", "line 2 has frames or a rate"),
+        (HEADER, "lists no segments"),
+        (f"{HEADER}dog_mann,a,b,1,9,60,1,\n".replace("\n", "\f"), "lists no segments"),
         (HEADER + "dog_mann,a.txt,trot,70,10,60,1,\n", "line 2 .* Frames 70 to 10"),
         (HEADER + "dog_mann,a.txt,trot,1,10,nan,1,\n", "line 2 .* 10 to 1000"),
         ("a,b\n1,2\n", "line 1 lacks dataset"),
