@@ -135,6 +135,8 @@ def read_commands(path: Path, gait: str) -> OrderTable:
             f"{path} is no table of commands: its first line must name the columns "
             f"{', '.join(_NEEDED)} and may name {', '.join(COLUMNS[4:])}."
         )
+    if not any(cell.strip() for line in lines[1:] for cell in line):
+        raise InputError(f"{path} is no table of commands: it lists none.")
     # Until the first row the robot stays where it is.
     times, rows = [0.0], [check_orders([0, 0, 0, gait, 0, 0])]
     for number, line in enumerate(lines[1:], 2):

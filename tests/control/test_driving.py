@@ -92,6 +92,7 @@ HEAD = "time,forward,sideways,yaw_rate"
         (f"{HEAD}\n2,0,0,0\n1,0,0,0\n", "line 3: .* must rise, and 1 s comes after 2"),
         (f"{HEAD}\n2,0,0,0\n2,0,0,0\n", "line 3: .* must rise"),
         (f"{HEAD}\n0,0,0,{'9' * 200_000}\n", "is no table of commands: field larger"),
+        (f"{HEAD}\n\n,,,\n", "is no table of commands: it lists none"),
         (f"{HEAD},gait\n0,0,0,0,fly\n", "line 2: Unknown gait 'fly'"),
         (f"{HEAD},push\n0,0,0,0,1e9\n", "line 2: A push must be a number from -100"),
         (f"{HEAD},reset\n0,0,0,0,2\n", "line 2: A reset must be 0 or 1"),

@@ -9,10 +9,12 @@ from loco_drake.common.errors import InputError
 from loco_drake.control.ground_path import ground_pose, path_velocity
 from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD, plan_from_motion
 from loco_drake.control.retiming import PathLimits, path_limits
+from loco_drake.models.robots import get_robot
+from loco_drake.motion.gaits import LABELS
 from loco_drake.systems.control import PlanPlayer
 from loco_drake.systems.reference_generator import ReferenceGenerator
 from loco_drake.systems.scenario import GeneratedReference, SteeringConfig
-from loco_drake.systems.steering import Steering
+from loco_drake.systems.steering import Steering, command_ranges
 from loco_drake.systems.toppra_smoother import ToppraSmoother
 from tests.synthetic_motion import synthetic_motion
 from tests.tiny_model import make_tiny_model
@@ -32,7 +34,7 @@ def build(robot, reference, limits=None, steering=True):
     builder.AddNamedSystem("reference", reference)
     chain = [reference]
     if steering:
-        system = Steering(robot)
+        system = Steering(robot, SteeringConfig(measured_ranges=False))
         chain.append(add(builder, "steering", system, reference.GetOutputPort("plan")))
         builder.ExportInput(system.GetInputPort("command"), "command")
         builder.ExportOutput(system.GetOutputPort("followed"), "followed")
@@ -229,6 +231,30 @@ def test_the_port_tells_what_is_followed(played):
     port.GetMutableData().get_mutable_value().set_value([9.0, 0.0, 0.4])
     simulator.AdvanceTo(1.0)
     assert 0.7 < followed.Eval(context)[0] < 4.0
+
+
+def test_commands_keep_the_published_range_of_their_gait(go2, long_trot):
+    published = command_ranges(go2)[long_trot.labels[0]]
+    builder = DiagramBuilder()
+    player = builder.AddNamedSystem("player", PlanPlayer(go2, long_trot))
+    steering = add(builder, "steering", Steering(go2), player.GetOutputPort("plan"))
+    simulator = Simulator(builder.Build())
+    context = steering.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    steering.GetInputPort("command").FixValue(context, [0.8, 0.0, 9.0])
+    simulator.AdvanceTo(0.5)
+    followed = steering.GetOutputPort("followed").Eval(context)
+    np.testing.assert_array_equal(followed, published.clip(np.array([0.8, 0.0, 9.0])))
+    assert 0.2 < followed[2] < 2.0
+
+
+@pytest.mark.parametrize("robot", ["go2", "a1"])
+def test_every_gait_has_a_published_range_around_its_own_pace(robot):
+    ranges = command_ranges(get_robot(robot))
+    assert sorted(ranges) == list(range(len(LABELS)))
+    for within in ranges.values():
+        assert within.low[0] <= within.high[0]
+        assert within.high[0] > 0
+        assert within.low[2] == -within.high[2]
 
 
 def test_bad_input_is_refused(go2, played):
