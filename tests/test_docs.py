@@ -115,3 +115,37 @@ def test_tracking_shows_the_committed_results(robot, title):
             f"{factor * figures[name][key]:.{digits}f}"
             for key, factor, digits in TRACKING_COLUMNS
         ], name
+
+
+# The same of docs/steering.md, behind the ranges and before the steps covered.
+STEERING_COLUMNS = (
+    ("velocity_rmse_mps", 1, 3),
+    ("yaw_rate_rmse_radps", 1, 3),
+    ("fall_rate", 100, 0),
+    ("normalized_return", 1, 1),
+    ("latency_reference_s", 1, 2),
+    ("latency_robot_s", 1, 2),
+)
+
+
+def steering_row(figures):
+    ranges, covered = ["–"] * 3, "–"  # of all labels together
+    if "range" in figures:
+        ends = figures["range"].values()
+        ranges = [f"{low:.2f} to {high:.2f}" for low, high in ends]
+        covered = f"{figures['steps_covered']} of {figures['steps']}"
+    values = [
+        "–" if figures[key] is None else f"{factor * figures[key]:.{digits}f}"
+        for key, factor, digits in STEERING_COLUMNS
+    ]
+    return [*ranges, *values, covered]
+
+
+@pytest.mark.parametrize(("robot", "title"), [("a1", "A1:"), ("go2", "Go2:")])
+def test_steering_shows_the_committed_results(robot, title):
+    page = (ROOT / "docs" / "steering.md").read_text()
+    (table,) = re.findall(rf"{title}\n\n((?:\|.*\n)+)", page)
+    rows = [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
+    results = json.loads((results_dir() / f"steering-{robot}.json").read_text())
+    figures = {**results["labels"], "all": results["all"]}
+    assert rows == [[name, *steering_row(own)] for name, own in figures.items()]

@@ -18,6 +18,7 @@ from loco_drake.evaluation.report.tables import figure_cell
 from tests.report_results import (
     learning,
     retargeting,
+    steering,
     tokenizer,
     tracking,
     write_results,
@@ -75,6 +76,48 @@ def test_scores_come_with_their_price(tmp_path):
     write_results(tmp_path, tracking_go2_generated=tracking())
     assert score(tmp_path, "normalized return, mean")[1] == "at stretch 1.021"
     assert score(tmp_path, "normalized return, worst")[1] == "dog-trot"
+
+
+@pytest.mark.parametrize(
+    ("title", "text", "note", "verdict"),
+    [
+        ("velocity off the command, all", "0.082", "at stretch 1.010", MISSED),
+        ("velocity off the command, worst", "0.100", "mpc-trot", MET),
+        ("yaw rate off", "0.050", "", BEST),
+        ("forward in trot, slowest", "-0.50", "", MET),
+        ("forward in trot, fastest", "2.00", "", MET),
+        ("sideways in trot", "0.30", "", MET),
+        ("turning in trot", "0.90", "", MISSED),
+        ("from a command to the first", "0.26", "", MET),
+        ("from a command to 90", "0.90", "", MET),
+        ("drives that end", "3.0", "", MISSED),
+        ("farthest from the plan in a drive", "0.31", "mpc-trot", MET),
+    ],
+)
+def test_steering_in_the_units_of_the_goals(tmp_path, title, text, note, verdict):
+    write_results(tmp_path, steering_go2=steering())
+    assert score(tmp_path, title) == (text, note, verdict)
+    assert score(tmp_path, title, "a1")[2] == UNKNOWN
+
+
+def test_a_small_error_does_not_count_if_the_plan_was_slowed_down(tmp_path):
+    for stretch, verdict in ((1.05, BEST), (1.06, MISSED)):
+        figures = steering(velocity_rmse_mps=0.03, stretch=stretch)
+        write_results(tmp_path, steering_go2=figures)
+        assert score(tmp_path, "velocity off the command, all")[2] == verdict
+
+
+def test_a_gait_that_was_not_evaluated_is_not_measured(tmp_path):
+    figures = steering()
+    del figures["labels"]["mpc-trot"]
+    write_results(tmp_path, steering_go2=figures)
+    assert score(tmp_path, "turning in trot")[::2] == ("–", UNKNOWN)
+    assert score(tmp_path, "velocity off the command, worst")[0] == "0.060"
+
+
+def test_steps_that_no_gait_covers_are_not_measured(tmp_path):
+    write_results(tmp_path, steering_go2=steering(latency_robot_s=None))
+    assert score(tmp_path, "from a command to 90")[::2] == ("–", UNKNOWN)
 
 
 @pytest.mark.parametrize(
