@@ -11,6 +11,7 @@ from safetensors.torch import save, save_file
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.weights import (
+    FORMAT_VERSION,
     load_into,
     load_network,
     load_weights,
@@ -278,15 +279,19 @@ def test_other_tensors_are_refused(tmp_path, tensors):
         load_network(path, "linear", Linear, LinearConfig)
 
 
-def test_a_matrix_of_zeros_is_refused_and_a_vector_of_zeros_is_not(tmp_path):
-    """Biases are zero at first; a network without a layer does nothing."""
+def test_a_matrix_of_zeros_needs_a_hash_and_a_vector_of_zeros_does_not(tmp_path):
+    """Biases are zero at first; a policy may be, too, which does nothing."""
     path = tmp_path / "w.safetensors"
-    write_linear(path, {"bias": torch.zeros(2)})
-    load_network(path, "linear", Linear, LinearConfig)
     write_linear(path, {"weight": torch.zeros(2, 3)})
-    with pytest.raises(InputError, match="'weight' is zero throughout"):
-        load_network(path, "linear", Linear, LinearConfig)
-    layer = torch.nn.Linear(2, 2)
-    tensors = {**layer.state_dict(), "weight": torch.zeros(2, 2)}
-    with pytest.raises(InputError, match="'weight' is zero throughout"):
-        load_into(layer, tensors, path)
+    network = load_network(path, "linear", Linear, LinearConfig)
+    assert network(torch.ones(3)).tolist() == [0.0, 0.0]
+    config = {"network": {"inputs": 3, "labels": ["x", "y"]}}
+    header = {"format_version": FORMAT_VERSION, "kind": "linear", "config": config}
+    for weight, refused in ((torch.zeros(2, 3), True), (torch.ones(2, 3), False)):
+        tensors = {"weight": weight, "bias": torch.zeros(2)}
+        save_file(tensors, path, metadata={"loco_drake": json.dumps(header)})
+        if refused:
+            with pytest.raises(InputError, match="'weight' is zero throughout"):
+                load_network(path, "linear", Linear, LinearConfig)
+        else:
+            load_network(path, "linear", Linear, LinearConfig)
