@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loco_drake.cli.evaluation import Evaluation, print_by_label, say_of
+from loco_drake.cli.evaluation import SimulatedEvaluation, print_by_label, say_of
 from loco_drake.cli.output import tracked, write_figure
 from loco_drake.motion.gaits import parse_label
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class EvaluateSteering(Evaluation):
+class EvaluateSteering(SimulatedEvaluation):
     """Drive the simulated robot by commands and measure how it follows them."""
 
     # Gait labels, such as dog-trot dog-pace. Default: those that the policy was trained
@@ -33,16 +33,7 @@ class EvaluateSteering(Evaluation):
     # and a figure of eight.
     figures: Path | None = None
 
-    def of_robots(self, names: list[str]) -> dict[str, Any]:
-        """Returns the figures of one robot, or of all by name.
-
-        Nothing is simulated before it is known that everything can be.
-        """
-        courses = {name: self._courses(name) for name in names}
-        results = {name: self._evaluate(name, *courses[name]) for name in names}
-        return results.get(self.robot, {"robots": results})
-
-    def _courses(self, name: str) -> "tuple[Scenario, list[Course]]":
+    def prepare(self, name: str) -> "tuple[Scenario, list[Course]]":
         """Returns what to simulate for a robot."""
         from loco_drake.control.actor import load_actor
         from loco_drake.evaluation.steering_courses import Course
@@ -72,9 +63,10 @@ class EvaluateSteering(Evaluation):
             Course(str(label), seeds, ranges.get(label.index)) for label in labels
         ]
 
-    def _evaluate(
+    def evaluate(
         self, name: str, scenario: "Scenario", courses: "list[Course]"
     ) -> dict[str, Any]:
+        """Returns the figures of one robot."""
         from loco_drake.evaluation.steering_table import overall, run_courses
 
         results = run_courses(scenario, courses, self.workers)
@@ -95,6 +87,6 @@ class EvaluateSteering(Evaluation):
         from loco_drake.evaluation.steering_pictures import steering_figures
 
         say_of(name)("Drawing")
-        scenario, _ = self._courses(name)
+        scenario, _ = self.prepare(name)
         for title, picture in steering_figures(scenario, figures, self.seed):
             write_figure(picture, folder / f"{name}-{title}.png")

@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from loco_drake.cli.evaluation import Evaluation, print_by_label
+from loco_drake.cli.evaluation import SimulatedEvaluation, print_by_label
 from loco_drake.cli.options import Policy
 from loco_drake.cli.output import tracked
 from loco_drake.common.errors import check_choice
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class EvaluateTracking(Evaluation):
+class EvaluateTracking(SimulatedEvaluation):
     """Simulate many episodes and measure how well a policy tracks its references."""
 
     # Gait labels, such as dog-trot dog-pace. Default: those that the policy was trained
@@ -68,16 +68,7 @@ class EvaluateTracking(Evaluation):
             self.randomization = self.randomization.with_standard()
         self.randomization.check()
 
-    def of_robots(self, names: list[str]) -> dict[str, Any]:
-        """Returns the figures of one robot, or of all by name.
-
-        Nothing is simulated before it is known that everything can be.
-        """
-        trials = {name: self._trials(name) for name in names}
-        results = {name: self._evaluate(name, *trials[name]) for name in names}
-        return results.get(self.robot, {"robots": results})
-
-    def _trials(self, name: str) -> "tuple[Scenario, list[Trial]]":
+    def prepare(self, name: str) -> "tuple[Scenario, list[Trial]]":
         """Returns what to simulate for a robot."""
         from loco_drake.control.actor import load_actor
         from loco_drake.datasets.registry import data_dir
@@ -114,9 +105,10 @@ class EvaluateTracking(Evaluation):
         seeds = range(self.seed, self.seed + self.seeds)
         return scenario, tracking_table.generated_trials(labels, seeds, self.duration)
 
-    def _evaluate(
+    def evaluate(
         self, name: str, scenario: "Scenario", trials: "list[Trial]"
     ) -> dict[str, Any]:
+        """Returns the figures of one robot."""
         from loco_drake.evaluation.tracking_table import run_trials, summarize
 
         episodes = run_trials(scenario, trials, self.workers, self.randomization)

@@ -97,6 +97,28 @@ class Evaluation:
         return recorded
 
 
+@dataclass(kw_only=True)
+class SimulatedEvaluation(Evaluation):
+    """Base of the evaluations that simulate.
+
+    Nothing is simulated before it is known that everything can be.
+    """
+
+    def of_robots(self, names: list[str]) -> dict[str, Any]:
+        """Returns the figures of one robot, or of all by name."""
+        prepared = {name: self.prepare(name) for name in names}
+        results = {name: self.evaluate(name, *prepared[name]) for name in names}
+        return results.get(self.robot, {"robots": results})
+
+    def prepare(self, name: str) -> tuple[Any, Any]:
+        """Returns the scenario of a robot, and what to simulate in it."""
+        raise NotImplementedError
+
+    def evaluate(self, name: str, scenario: Any, work: Any) -> dict[str, Any]:
+        """Returns the figures of one robot."""
+        raise NotImplementedError
+
+
 def say_of(robot: str) -> Callable[[str], None]:
     """Returns a function that prints progress for a robot on stderr."""
     return lambda text: say(f"{robot}: {text}")

@@ -59,13 +59,14 @@ def steered_motion(robot: Robot, motion: Motion, seed: int | Sequence[int]) -> M
     plan = plan_from_motion(robot, motion)
     within = training_range(motion)
     random = np.random.default_rng(seed)
-    steered: Steered = begin(plan)
+    plain = begin(plan)
+    steered: Steered = plain
     commands = []
     for time in np.arange(0.0, plan.end_time, PERIOD):
         commands.append(_drawn(within, random))
         steered = steer(robot, steered, plan, commands[-1], float(time), _RESPONSE)
     moved = steered.plan
-    apart = np.abs(steered.speed - begin(plan).speed).mean(axis=0)
+    apart = np.abs(steered.speed - plain.speed).mean(axis=0)
     return replace(
         motion,
         base_position=moved.q[POSITION],

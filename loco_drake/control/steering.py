@@ -61,11 +61,6 @@ class Steered(Immutable):
     # shape (N, 4, 2).
     offset: Array
 
-    def speed_at(self, path_time: float) -> Array:
-        """Returns the velocity that the plan has at this plan time, shape (3,)."""
-        times = self.plan.path_time
-        return np.array([np.interp(path_time, times, s) for s in self.speed.T])
-
 
 def begin(raw: Plan) -> Steered:
     """Returns ``raw`` not steered yet: the command is the pace that it has."""
@@ -108,7 +103,8 @@ def steer(
     before = _tail(before, drop)
     last = int(np.ceil((fixed - raw.path_time[0]) / PLAN_DT - 1e-6))
     last = min(max(last, 0), len(before.plan) - 1, len(raw) - 1)
-    natural = pace(path_velocity(ground_pose(raw.q)))
+    raw_pose = ground_pose(raw.q)
+    natural = pace(path_velocity(raw_pose))
     now = natural[last:].mean(axis=0)
     wanted = {
         label: (ranges or {}).get(label, ANY_COMMAND).clip(command)
@@ -117,7 +113,9 @@ def steer(
     best: tuple[float, Steered] | None = None
     for share in _SHARES:
         targets = {k: c - (1 - share) * (c - now) for k, c in wanted.items()}
-        bent, excess = _bend(robot, before, raw, natural, targets, last, response)
+        bent, excess = _bend(
+            robot, before, raw, raw_pose, natural, targets, last, response
+        )
         if best is None or excess < best[0]:
             best = excess, bent
         if excess <= 0:
@@ -143,6 +141,7 @@ def _bend(
     robot: Robot,
     before: Steered,
     raw: Plan,
+    raw_pose: Array,
     natural: Array,
     targets: Mapping[int, Array],
     last: int,
@@ -160,14 +159,13 @@ def _bend(
         speed, rate = (
             np.concatenate(ab) for ab in zip((speed, rate), more, strict=True)
         )
-    raw_pose = ground_pose(raw.q)
     change = (speed - natural)[last:]
     velocity = path_velocity(raw_pose[last:]) + (change[:-1] + change[1:]) / 2
     pose = np.concatenate(
         (before.pose[: last + 1], integrate(before.pose[last], velocity))
     )
     turn = pose[:, 2] - raw_pose[:, 2]
-    lean = _lean(robot, speed, rate, natural, pose[:, 2])
+    lean = _lean(robot, speed, natural, pose[:, 2])
     carried = (
         lean[:, None]
         + pose[:, None, :2]
@@ -175,7 +173,7 @@ def _bend(
     )
     offset = np.stack(
         [
-            _foot_offset(before, raw, foot, pose, carried, lean, last)
+            _foot_offset(before, raw, foot, raw_pose, pose, carried, lean, last)
             for foot in range(4)
         ],
         axis=1,
@@ -229,7 +227,7 @@ def _runs(labels: Integers) -> Iterator[tuple[int, int]]:
         yield label, len(list(same))
 
 
-def _lean(robot: Robot, speed: Array, rate: Array, natural: Array, yaw: Array) -> Array:
+def _lean(robot: Robot, speed: Array, natural: Array, yaw: Array) -> Array:
     """Returns by how much the feet are displaced in a turn, m in W, shape (N, 2).
 
     An inverted pendulum that is to accelerate stands beside its foot, by the
@@ -246,13 +244,13 @@ def _foot_offset(
     before: Steered,
     raw: Plan,
     foot: int,
+    raw_pose: Array,
     pose: Array,
     carried: Array,
     lean: Array,
     last: int,
 ) -> Array:
     """Returns the offset of one foot, unchanged up to sample ``last``, (N, 2)."""
-    raw_pose = ground_pose(raw.q)
     toe, carried = raw.p_WF[:, foot, :2], carried[:, foot]
     slope_toe, slope_carried = (np.gradient(a, axis=0) for a in (toe, carried))
     old = before.offset[:, foot]
