@@ -55,6 +55,29 @@ def policy_path(robot: Robot, policy: Path | None = None) -> Path:
     return variants[str(policy)]
 
 
+def training_path(name: Path) -> Path:
+    """Returns the file that a training starts from.
+
+    ``name`` is a file, which is returned as it is, or a shipped policy: a robot, or a
+    robot and a variant, such as "a1_randomized".
+
+    Raises:
+        InputError: if there is neither; names the shipped policies.
+    """
+    if name.is_file():
+        return name
+    shipped = {
+        file.stem.removeprefix("policy_"): file
+        for file in sorted(pretrained_dir().glob("policy_*.safetensors"))
+    }
+    if str(name) not in shipped:
+        raise InputError(
+            f"There is nothing to start from at {str(name)!r}; give a checkpoint or "
+            f"policy of a run, or a shipped policy: {', '.join(shipped) or 'none'}."
+        )
+    return shipped[str(name)]
+
+
 def results_path(name: str) -> Path:
     """Returns the path of shipped figures, such as "steering-go2"."""
     return pretrained_dir() / "results" / f"{name}.json"

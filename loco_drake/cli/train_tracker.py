@@ -29,8 +29,9 @@ class TrainTracker(TrainingConfig):
     # Randomize friction, masses, motors, latency, pushes and sensor noise in each
     # episode. Parts without a range of their own use the standard range.
     randomize: bool = False
-    # A checkpoint.safetensors of any robot whose networks to start from.
-    start_from: Annotated[Path | None, option(metavar="FILE")] = None
+    # Networks to start from: a shipped policy (go2, a1, a1_randomized, ...), or the
+    # policy.safetensors or checkpoint.safetensors of a run; of any robot.
+    start_from: Annotated[Path | None, option(metavar="POLICY|FILE")] = None
     # Continue from the checkpoint in --out with the options of that run. Only --steps
     # may increase.
     resume: bool = False
@@ -40,6 +41,7 @@ class TrainTracker(TrainingConfig):
         """Trains, prints and writes; returns the exit status."""
         from loco_drake.common.run_folder import check_folder, options_of
         from loco_drake.models.robots import get_robot
+        from loco_drake.models.shipped import training_path
         from loco_drake.tracking.references import load_references
         from loco_drake.tracking.train import POLICY, train_tracker
 
@@ -49,6 +51,7 @@ class TrainTracker(TrainingConfig):
             environment.randomization = environment.randomization.with_standard()
         self.check()
         check_folder(self.out, POLICY, self.resume)
+        start = self.start_from and training_path(self.start_from)
         if self.references is None:
             raise InputError("--references must name a folder of Motion files.")
         plans = load_references(get_robot(environment.robot), self.references)
@@ -64,7 +67,7 @@ class TrainTracker(TrainingConfig):
                 self,
                 self.out,
                 resume=self.resume,
-                first=self.start_from,
+                first=start,
                 options=options_of(self),
                 report=report,
             )

@@ -226,7 +226,7 @@ def restore_learning(
     Raises:
         InputError: if the tensors do not fit.
     """
-    load_module(saved, module)
+    load_into(module, networks(saved), saved.path)
     with sound(saved.path):
         moments: dict[int, dict[str, Tensor]] = {}
         for key, value in part(saved, "optimizer").items():
@@ -246,15 +246,10 @@ def restore_learning(
         torch.set_rng_state(saved.tensors["random/torch"])
 
 
-def load_module(saved: Checkpoint, module: nn.Module) -> None:
-    """Loads the networks of a checkpoint into ``module``.
-
-    Raises:
-        InputError: if they do not fit.
-    """
+def networks(saved: Checkpoint) -> dict[str, Tensor]:
+    """Returns the state dict of a checkpoint's networks."""
     # Earlier trackers used the prefix "policy".
-    tensors = part(saved, "module") or part(saved, "policy")
-    load_into(module, tensors, saved.path)
+    return part(saved, "module") or part(saved, "policy")
 
 
 def part(saved: Checkpoint, name: str) -> dict[str, Tensor]:

@@ -124,6 +124,17 @@ def load_weights(
     return tensors, header["config"]
 
 
+def kind_of(path: Path) -> str | None:
+    """Returns the kind that a weights file claims to hold, None if it claims none."""
+    try:
+        with safe_open(path, framework="pt") as file:
+            header = parse_json((file.metadata() or {})["loco_drake"])
+        kind = header["kind"]
+    except Exception:  # safetensors, its Rust and json raise many kinds
+        return None
+    return kind if isinstance(kind, str) else None
+
+
 def load_into(module: torch.nn.Module, tensors: dict[str, Tensor], path: Path) -> None:
     """Copies ``tensors`` into ``module``.
 

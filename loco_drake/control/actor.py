@@ -6,6 +6,7 @@ learning symmetric locomotion"), so whatever it learns about one side holds for 
 other.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from itertools import chain
 from pathlib import Path
@@ -36,6 +37,7 @@ from loco_drake.models.robots import Robot
 from loco_drake.motion.motion import FPS
 
 KIND = "policy"
+_LEARNER = "learner/"  # prefix of tensors that only a training needs
 OBSERVATION_CLIP = 5.0  # standard deviations
 # Parts of the observation that need the base's position in the world or its velocity.
 PRIVILEGED = ("v_WB_H", "height", "plan_p_H")
@@ -124,14 +126,40 @@ class Actor(nn.Module):
         return (self.layers(normal) + mirror_actions(image)) / 2
 
 
-def save_actor(actor: Actor, path: Path, *, half: bool = False) -> None:
-    """Writes the policy's weights, those of the layers in 16 bits if ``half``."""
-    tensors = {
-        # The normalizer's statistics exceed the range of 16 bits.
-        name: value.half() if half and name not in ("mean", "variance") else value
-        for name, value in actor.state_dict().items()
-    }
+def save_actor(
+    actor: Actor, path: Path, learner: Mapping[str, Tensor] | None = None
+) -> None:
+    """Writes the policy's weights, and what a training needs to start from them."""
+    tensors = dict(actor.state_dict())
+    tensors |= {f"{_LEARNER}{name}": value for name, value in (learner or {}).items()}
     save_weights(path, KIND, tensors, asdict(actor.config))
+
+
+def halve_policy(source: Path, target: Path) -> None:
+    """Copies a policy file with its networks in 16 bits, half the size.
+
+    Raises:
+        InputError: if ``source`` is missing, damaged, or no policy.
+    """
+    tensors, config = load_weights(source, KIND)
+    for name, value in tensors.items():
+        # The normalizer's statistics exceed the range of 16 bits.
+        if value.dtype == torch.float32 and name not in ("mean", "variance"):
+            tensors[name] = value.half()
+    save_weights(target, KIND, tensors, config)
+
+
+def split_learner(
+    tensors: Mapping[str, Tensor],
+) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    """Returns the actor's tensors of a policy file, and the learner's."""
+    actor, learner = {}, {}
+    for name, value in tensors.items():
+        if name.startswith(_LEARNER):
+            learner[name.removeprefix(_LEARNER)] = value
+        else:
+            actor[name] = value
+    return actor, learner
 
 
 def load_actor(path: Path, robot: Robot) -> Actor:
@@ -150,4 +178,4 @@ def load_actor(path: Path, robot: Robot) -> Actor:
             what = name.replace("_", " ")
             detail = f": {trained}, not {value}" if name == "robot" else ""
             raise InputError(f"The policy in {path} is for another {what}{detail}.")
-    return build_network(path, Actor, config, tensors).eval()
+    return build_network(path, Actor, config, split_learner(tensors)[0]).eval()

@@ -157,14 +157,24 @@ def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
     return learner
 
 
+def actor_layers(hidden: int) -> dict[str, str]:
+    """Returns the names of the layers in Actor and, to each, in SymmetricPolicy.
+
+    ``hidden`` is the number of hidden layers; activations lie between them.
+    """
+    layers = {
+        f"layers.{2 * i}": f"mlp_extractor.policy_net.{2 * i}" for i in range(hidden)
+    }
+    return {**layers, f"layers.{2 * hidden}": "action_net"}
+
+
 def export_actor(learner: AdaptivePPO, config: ActorConfig) -> Actor:
     """Returns the learner's policy as the network that the diagram uses."""
     actor = Actor(config)
-    policy = learner.policy
-    trained = [*policy.mlp_extractor.policy_net, policy.action_net]
     with torch.no_grad():
-        for ours, theirs in zip(actor.layers, trained, strict=True):
-            ours.load_state_dict(theirs.state_dict())
+        for ours, theirs in actor_layers(len(config.hidden)).items():
+            trained = learner.policy.get_submodule(theirs)
+            actor.get_submodule(ours).load_state_dict(trained.state_dict())
         actor.mean.copy_(torch.from_numpy(learner.statistics.mean))
         actor.variance.copy_(torch.from_numpy(learner.statistics.var))
     return actor.eval()

@@ -18,20 +18,24 @@ from loco_drake.common import run_folder
 from loco_drake.common.determinism import single_thread
 from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import Checkpoint, RunFolder
-from loco_drake.control.actor import ActorConfig, save_actor
-from loco_drake.control.observation import OBSERVATION_LAYOUT
+from loco_drake.control.actor import ActorConfig
 from loco_drake.control.plan import Plan
 from loco_drake.motion.gaits import ROW_LABELS
+from loco_drake.tracking.beginning import (
+    LAYOUT,
+    NAME,
+    of_checkpoint,
+    read_beginning,
+    save_policy,
+)
 from loco_drake.tracking.config import TrainingConfig
 from loco_drake.tracking.learning_curve import PROGRESS, learning_curve, trim_log
-from loco_drake.tracking.ppo import AdaptivePPO, export_actor, make_ppo
+from loco_drake.tracking.ppo import AdaptivePPO, make_ppo
 from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.workers import WorkerVecEnv
 
-NAME = "tracker"
 POLICY = "policy.safetensors"
 
-_LAYOUT = [list(part) for part in OBSERVATION_LAYOUT]
 # State of the sampler.
 _SCORES = ("scores", "shares", "plan_scores", "plan_shares")
 
@@ -63,8 +67,8 @@ def train_tracker(
         config: how to train.
         folder: for the results.
         resume: go on from the checkpoint in ``folder``.
-        first: a checkpoint of any training, whose networks and normalizer are those to
-            begin with; all else begins anew.
+        first: a checkpoint or policy of any training, whose networks, normalizer and
+            learning rate are those to begin with; all else begins anew.
         options: of the command, for :func:`.run_folder.open_run`.
         report: called after each batch.
 
@@ -85,9 +89,9 @@ def train_tracker(
     run = {
         **run_folder.settings(own, "steps"),
         "references": f"{len(plans)} motions of {sum(map(len, plans))} samples",
-        "observation_layout": _LAYOUT,
+        "observation_layout": LAYOUT,
     }
-    beginning = None if first is None else _beginning(first, config.ppo.hidden)
+    beginning = None if first is None else read_beginning(first, config.ppo.hidden)
     sampler = PlanSampler(plans, config.seed)
     start = time.monotonic()
     with (
@@ -119,7 +123,7 @@ def train_tracker(
         try:
             learner = make_ppo(environment, config.ppo, config.seed)
             if beginning is not None:
-                _start_from(learner, beginning)
+                beginning.load(learner)
             if held.saved is not None:
                 _restore(learner, sampler, held.saved)
             writer = TensorBoardOutputFormat(str(folder))
@@ -149,18 +153,6 @@ def train_tracker(
     }
 
 
-def _beginning(path: Path, hidden: list[int]) -> Checkpoint:
-    """Returns a checkpoint whose networks have the required sizes."""
-    saved = run_folder.read_checkpoint(path, NAME)
-    with run_folder.sound(path):
-        own, layout = saved.run["hidden"], saved.run["observation_layout"] or _LAYOUT
-    if own != hidden:
-        raise InputError(f"{path} is of networks with --hidden {own}, not {hidden}.")
-    if layout != _LAYOUT:
-        raise InputError(f"{path} is of another observation layout.")
-    return saved
-
-
 def _state(
     learner: AdaptivePPO, sampler: PlanSampler
 ) -> tuple[dict[str, Tensor], dict[str, Any]]:
@@ -183,19 +175,9 @@ def _state(
     }
 
 
-def _start_from(learner: AdaptivePPO, saved: Checkpoint) -> None:
-    """Loads only networks and normalizer of a checkpoint into ``learner``."""
-    run_folder.load_module(saved, learner.policy)
-    with run_folder.sound(saved.path):
-        statistics = learner.statistics
-        statistics.mean = saved.tensors["normalizer/mean"].numpy()
-        statistics.var = saved.tensors["normalizer/variance"].numpy()
-        statistics.count = float(saved.state["normalizer_count"])
-
-
 def _restore(learner: AdaptivePPO, sampler: PlanSampler, saved: Checkpoint) -> None:
     """Restores ``learner`` and ``sampler`` from the checkpoint."""
-    _start_from(learner, saved)
+    of_checkpoint(saved).load(learner)
     run_folder.restore_learning(saved, learner.policy, learner.policy.optimizer)
     with run_folder.sound(saved.path):
         for name in _SCORES:
@@ -209,7 +191,6 @@ def _restore(learner: AdaptivePPO, sampler: PlanSampler, saved: Checkpoint) -> N
         keys = saved.tensors["random/numpy"].numpy().astype(np.uint32)
         np.random.set_state(("MT19937", keys, position, has_gauss, gauss))  # noqa: NPY002
         learner.num_timesteps = saved.state["steps"]
-        learner.rate = float(saved.state["learning_rate"])
 
 
 @dataclass(eq=False)
@@ -262,4 +243,4 @@ class _Saver(BaseCallback):
             hidden=self.config.ppo.hidden,
             privileged=self.config.ppo.privileged,
         )
-        save_actor(export_actor(learner, actor), self.log.parent / POLICY)
+        save_policy(learner, actor, self.log.parent / POLICY)

@@ -1,11 +1,13 @@
 import json
 
 import pytest
+import torch
 
 from loco_drake.cli.main import main
 from loco_drake.common.run_folder import read_checkpoint
 from loco_drake.control.actor import load_actor
 from loco_drake.models.robots import get_robot
+from loco_drake.models.shipped import pretrained_path
 from loco_drake.motion.motion_file import save_motion
 from loco_drake.tracking.randomization import STANDARD
 from tests.synthetic_motion import synthetic_motion
@@ -45,12 +47,29 @@ def test_options_reach_the_training(references, tmp_path, capsys):
     assert "has --privileged False, not True;" in capsys.readouterr().err
 
 
+@pytest.mark.slow
+def test_a_shipped_policy_can_be_started_from(references, tmp_path):
+    """The A1's for a Go2: five steps of Adam at its learning rate hardly change it."""
+    options = "--start-from a1_randomized --steps 64 --batch 64 --workers 1"
+    out = tmp_path / "run"
+    assert train(references, *options.split(), "--out", str(out)) == 0
+    a1, go2 = get_robot("a1"), get_robot("go2")
+    shipped = load_actor(pretrained_path("policy_a1_randomized"), a1)
+    learned = load_actor(out / "policy.safetensors", go2)
+    with torch.no_grad():
+        for old, new in zip(
+            shipped.layers.parameters(), learned.layers.parameters(), strict=True
+        ):
+            assert 0 < (old - new).abs().max() < 2e-3
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ("--randomization.friction 1.2 .4", "friction must be two numbers"),
         ("--randomization.noise -1", "noise must be 0 or more"),
         ("--start-from nowhere.safetensors", "nowhere.safetensors"),
+        ("--start-from go3", "or a shipped policy: a1,"),
         ("--start-from x.safetensors --resume", "not both"),
     ],
 )

@@ -144,6 +144,14 @@ def _kinds() -> Iterator[Kind]:
         weights.safetensors_files,
         share=0.8,
     )
+    yield Kind(
+        "policy to start from",
+        "policy.safetensors",
+        f"{makers.TRACKER} --start-from {{target}}",
+        makers.start,
+        weights.safetensors_files,
+        share=0.8,
+    )
     for form, (file, source, gait, damages) in RECORDINGS.items():
         options = f"--source {source} --json out/figures.json"
         for name, command, share in (

@@ -69,7 +69,8 @@ def tokenizer_run(folder: Path) -> None:
 def tracker_run(folder: Path) -> None:
     references(folder)
     _run(folder, *TRACKER.split())
-    shutil.copy(folder / "out/run/checkpoint.safetensors", folder)
+    for name in ("checkpoint", "policy"):
+        shutil.copy(folder / f"out/run/{name}.safetensors", folder)
 
 
 def start(folder: Path) -> None:

@@ -9,7 +9,13 @@ import torch
 from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import read_checkpoint
 from loco_drake.common.weights import load_weights, save_weights
-from loco_drake.control.actor import load_actor, mirror_actions, mirror_observations
+from loco_drake.control.actor import (
+    halve_policy,
+    load_actor,
+    mirror_actions,
+    mirror_observations,
+    save_actor,
+)
 from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
@@ -148,8 +154,52 @@ def test_a_training_can_start_from_another_one(trained, plans, tmp_path):
             torch.testing.assert_close(begun.tensors[name], value, rtol=0, atol=0)
     assert not [name for name in begun.tensors if name.startswith("optimizer/")]
     assert (begun.tensors["sampler/scores"] == 0).all()
-    assert begun.state["normalizer_count"] == ended.state["normalizer_count"]
-    assert begun.state["learning_rate"] == other.ppo.actor_rate
+    for name in ("normalizer_count", "learning_rate"):
+        assert begun.state[name] == ended.state[name]
+
+
+def test_a_policy_file_is_as_good_to_start_from_as_the_checkpoint(
+    trained, plans, tmp_path
+):
+    """Its statistics have 32 bits; the first batch, from both, is the same."""
+    begun = {}
+    for name in ("checkpoint", "policy"):
+        file = trained[0] / f"{name}.safetensors"
+        train_tracker(plans, config(0), tmp_path / name, first=file)
+        begun[name] = saved_in(tmp_path / name)
+    a, b = begun.values()
+    assert a.state == b.state
+    assert a.tensors.keys() == b.tensors.keys()
+    for name, value in a.tensors.items():
+        tolerance = 1e-6 if name.startswith("normalizer/") else 0.0
+        torch.testing.assert_close(
+            b.tensors[name], value, rtol=tolerance, atol=0, equal_nan=True
+        )
+
+
+def test_a_policy_in_half_precision_can_be_started_from(trained, plans, tmp_path):
+    """The diagram's policy and the learner's are the same network, in 16 bits."""
+    whole, half = trained[0] / "policy.safetensors", tmp_path / "half.safetensors"
+    halve_policy(whole, half)
+    train_tracker(plans, config(0), tmp_path, first=half)
+    again = tmp_path / "policy.safetensors"
+    first, learned, exact = (
+        load_actor(file, get_robot("go2")).state_dict() for file in (half, again, whole)
+    )
+    for name, value in first.items():
+        assert torch.equal(value, learned[name]), name
+        torch.testing.assert_close(value, exact[name], rtol=1e-3, atol=1e-4)
+    assert half.stat().st_size < 0.7 * whole.stat().st_size
+
+
+def test_a_policy_without_its_critic_is_refused(trained, plans, tmp_path):
+    """As they were written before, or by save_actor."""
+    actor = load_actor(trained[0] / "policy.safetensors", get_robot("go2"))
+    save_actor(actor, tmp_path / "alone.safetensors")
+    with pytest.raises(InputError, match="without its critic"):
+        train_tracker(
+            plans, config(0), tmp_path / "out", first=tmp_path / "alone.safetensors"
+        )
 
 
 def test_an_unprivileged_policy_can_start_from_a_privileged_one(
