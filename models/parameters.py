@@ -72,7 +72,7 @@ def surplus_inertia(robot: Robot, plant: PlantConfig) -> Array:
     In kg m^2; see :class:`loco_drake.systems.domain.Actuation`.
     """
     h = 0.0 if plant.contact == "cenic" else plant.time_step
-    return (robot.kd + robot.kp * h) * h
+    return robot.kd * h
 
 
 def least_strength(robot: Robot, plant: PlantConfig) -> float:

@@ -10,11 +10,12 @@ from pydrake.multibody.plant import (
     MultibodyPlant,
     MultibodyPlantConfig,
 )
-from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder
 
-from loco_drake.common.errors import check_choice, check_number
+from loco_drake.common.arrays import Array
+from loco_drake.common.errors import InputError, check_choice, check_number
 
 from .ground import AddGround
 from .robots import AddRobotModel, Robot
@@ -51,6 +52,33 @@ class PlantConfig:
             check_number(f"The plant's {name}", getattr(self, name), low, high)
 
 
+def plant_damping(robot: Robot, config: PlantConfig) -> Array:
+    """Returns the damping of the PD in the plant, N m s/rad, shape (12,).
+
+    A discrete plant applies its PD implicitly. With q and v at the beginning of a step
+    of length h and v' at its end, the torque is
+
+        kp (q_d - q - h v') - d v' = kp (q_d - q) - (d + h kp) v'
+
+    so the step itself damps by h kp. The plant gets d = robot.kd - h kp, and the motors
+    damp by robot.kd at every step. CENIC controls its error, and gets robot.kd.
+
+    Raises:
+        InputError: if the step alone would damp by more than the motors do.
+    """
+    if config.contact == "cenic":
+        return robot.kd
+    damping = robot.kd - robot.kp * config.time_step
+    if damping.min() < 0:
+        longest = float((robot.kd / robot.kp).min())
+        raise InputError(
+            f"The plant's time_step must be at most {longest:g} s for {robot.name}, "
+            f"not {config.time_step:g}: the step alone would damp the joints by more "
+            "than the motors do."
+        )
+    return damping
+
+
 def AddRobotPlant(
     builder: DiagramBuilder,
     robot: Robot,
@@ -63,7 +91,8 @@ def AddRobotPlant(
     at (0, 0, robot.stand_height), joints at robot.stand_joints. Its PD runs inside the
     plant; the port ``plant.get_desired_state_input_port(instance)`` takes [q_d; v_d] of
     the 12 joints, in rad and rad/s. The joints are limp while it is not connected. v_d
-    must be 0, since CENIC of Drake 1.51 applies it with the wrong sign.
+    must be 0, since CENIC of Drake 1.51 applies it with the wrong sign. The PD has the
+    stiffness robot.kp and the damping :func:`plant_damping`.
 
     With the contact "cenic" also call :func:`ConfigureSimulator`. ``pre_finalize`` may
     add to the plant.
@@ -72,9 +101,10 @@ def AddRobotPlant(
         The plant, the scene graph and the robot's model instance.
 
     Raises:
-        InputError: if ``config`` is invalid.
+        InputError: if ``config`` is invalid, or its step too long for the robot's PD.
     """
     config.check()
+    damping = plant_damping(robot, config)
     continuous = config.contact == "cenic"
     plant_config = MultibodyPlantConfig(
         time_step=0.0 if continuous else config.time_step,
@@ -92,6 +122,9 @@ def AddRobotPlant(
     scene_graph_config.default_proximity_properties.resolution_hint = None
     scene_graph.set_config(scene_graph_config)
     instance = AddRobotModel(Parser(plant), robot.name, visual=config.visual)
+    for joint, p, d in zip(robot.joint_names, robot.kp, damping, strict=True):
+        actuator = plant.GetJointActuatorByName(joint.removesuffix("_joint"))
+        actuator.set_controller_gains(PdControllerGains(p=p, d=d))
     AddGround(plant, friction=config.friction, visual=config.visual)
     if pre_finalize is not None:
         pre_finalize(plant, scene_graph)

@@ -45,8 +45,10 @@ class Robot(Quadruped):
     # About each joint with the others locked in the standing pose, including reflected
     # inertia, kg m^2, shape (12,).
     joint_inertia: Array
-    kp: Array  # stiffness of the PD in the plant, N m/rad, shape (12,)
-    kd: Array  # damping of the PD in the plant, N m s/rad, shape (12,)
+    kp: Array  # stiffness of the motors' PD, N m/rad, shape (12,)
+    # Damping of the motors' PD, N m s/rad, shape (12,). A plant's own is less, see
+    # models.plant.plant_damping.
+    kd: Array
     mass: float  # of the whole robot, kg
     # Y in m from the hip joint's axis to the thigh joint, positive on the left, shape
     # (4,).

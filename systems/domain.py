@@ -67,19 +67,20 @@ class Actuation(DomainSystem):
     step that begins at t uses those of t - n time_step, or the first ones at the start.
 
     *Strength.* Drake stores PD gains and effort limits outside the Context, but the
-    torque kp (q_d - q) - kd v is linear in the set-point. For strength s, with q and v
-    at the beginning of a step of length h, the set-point
+    torque of the PD is linear in the set-point. In a step of length h it is
+    kp (q_d - q) - kd v', with q and v at the beginning of the step, v' at its end and
+    the motors' kd, see :func:`loco_drake.models.plant.plant_damping`. For strength s
+    the set-point
 
-        q_d' = s q_d + (1 - s) (q + (h + kd / kp) v)
+        q_d' = s q_d + (1 - s) (q + kd / kp v)
 
-    makes the implicit PD, which acts on the velocity v' at the end of the step and on
-    q + h v', apply the torque
+    makes it
 
-        s (kp (q_d - q - h v') - kd v') - (1 - s) (kd + kp h) (v' - v).
+        s (kp (q_d - q) - kd v') - (1 - s) kd (v' - v).
 
     The first term is s times the nominal torque. The second acts like an inertia
-    (1 - s) (kd + kp h) h, which SetDomain subtracts from the rotor inertia. The joints
-    then move as with the gains s kp and s kd. The plant's port net_actuation contains
+    (1 - s) kd h, which SetDomain subtracts from the rotor inertia. The joints then move
+    as with the gains s kp and s kd. The plant's port net_actuation contains
     both terms. Under "cenic" h is 0, and the rotor inertia does not change. The effort
     limits do not change either: a weak motor has less torque at the same command, but
     the same maximum.
@@ -89,8 +90,7 @@ class Actuation(DomainSystem):
         super().__init__()
         self._robot, self._plant = robot, plant
         self._joints = joints = len(robot.joint_names)
-        h = 0.0 if plant.contact == "cenic" else plant.time_step
-        self._prediction = h + robot.kd / robot.kp
+        self._prediction = robot.kd / robot.kp
         self._desired = self.DeclareVectorInputPort("desired_state", 2 * joints)
         self._state = self.DeclareVectorInputPort("state", 13 + 2 * joints)
         # Set-points of recent steps, newest first; NaN before the first.

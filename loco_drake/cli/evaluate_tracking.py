@@ -74,7 +74,7 @@ class EvaluateTracking(SimulatedEvaluation):
         from loco_drake.datasets.registry import data_dir
         from loco_drake.datasets.segments import read_segments
         from loco_drake.evaluation import tracking_table
-        from loco_drake.models.plant import PlantConfig
+        from loco_drake.models.plant import PlantConfig, plant_damping
         from loco_drake.models.robots import get_robot
         from loco_drake.models.shipped import policy_path
         from loco_drake.systems import scenario as systems
@@ -91,6 +91,7 @@ class EvaluateTracking(SimulatedEvaluation):
             friction=self.friction,
         )
         plant.check()
+        plant_damping(robot, plant)
         policy = systems.TrainedPolicy(weights=weights)
         scenario = systems.Scenario(robot=name, plant=plant, policy=policy)
         if self.reference == "retargeted":

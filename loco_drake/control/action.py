@@ -6,7 +6,7 @@ import numpy as np
 
 from loco_drake.common.arrays import Array, read_only
 from loco_drake.common.rotations import quat_conjugate, quat_rotate
-from loco_drake.control.plan import Plan
+from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.state import JOINT_VELOCITIES, JOINTS, ORIENTATION, VELOCITY
 from loco_drake.models.robots import Robot
 
@@ -20,7 +20,7 @@ def joint_targets(set_points: Array, action: Array) -> Array:
 
     q_d = set_points + ACTION_SCALE * action, and v_d = 0. The set-points contain the
     desired velocity, because Drake's CENIC integrator (1.51) applies v_d with the wrong
-    sign. The torque kp (q_d - q) - kd v is the same. ``set_points`` (..., J), rad, are
+    sign. The torque of the PD is the same. ``set_points`` (..., J), rad, are
     :func:`set_points` at the end of the control period; ``action`` is (..., J).
     """
     q_d = set_points + ACTION_SCALE * action
@@ -31,12 +31,22 @@ def joint_targets(set_points: Array, action: Array) -> Array:
 def set_points(robot: Robot, plan: Plan) -> Array:
     """Returns the PD set-points that track ``plan``, rad, shape (N, J).
 
-    They are q + (kd v + tau) / kp with the PD gains and the torques tau of
-    :func:`feed_forward_torques`.
+    They are q + (d v + tau) / kp with the torques tau of :func:`feed_forward_torques`
+    and d = :func:`velocity_gain`.
     """
     torques = feed_forward_torques(robot, plan)
-    ahead = (robot.kd * plan.v[JOINT_VELOCITIES] + torques) / robot.kp
+    ahead = (velocity_gain(robot) * plan.v[JOINT_VELOCITIES] + torques) / robot.kp
     return read_only(plan.q[JOINTS] + ahead)
+
+
+def velocity_gain(robot: Robot) -> Array:
+    """Returns the gain of planned joint velocities, N m s/rad, shape (12,).
+
+    kd v makes up for the damping of the motors. A set-point is held for a control
+    period T and belongs to its end, so it is T / 2 ahead of the joints on average, and
+    T / 2 kp v of that torque is there already: the gain is kd - T / 2 kp.
+    """
+    return robot.kd - PLAN_DT / 2 * robot.kp
 
 
 def feed_forward_torques(robot: Robot, plan: Plan) -> Array:

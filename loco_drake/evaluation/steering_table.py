@@ -48,6 +48,7 @@ from loco_drake.evaluation.tracking import (
     slip_speeds,
     stretch,
 )
+from loco_drake.models.plant import plant_damping
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.quality import (
@@ -79,6 +80,7 @@ class _Driver:
 
     def __init__(self, scenario: Scenario) -> None:
         self._robot = get_robot(scenario.robot)
+        self._damping = plant_damping(self._robot, scenario.plant)
         self._recorder = Recorder(scenario)
         self._command = self._recorder.diagram.GetInputPort("command")
         self._plan = self._recorder.diagram.GetOutputPort("plan")
@@ -184,7 +186,7 @@ class _Driver:
         rollout = self._run(label, seed, _POINT, lambda _: command)
         counted = round(_SETTLING / PLAN_DT)
         velocity = stride_velocity(self._robot, rollout.state)[counted:]
-        effort = effort_metrics(rollout, self._robot)
+        effort = effort_metrics(rollout, self._robot, self._damping)
         return Point(
             command=command,
             velocities=velocity,

@@ -245,10 +245,11 @@ def slip_speeds(rollout: Rollout, robot: Robot) -> Array:
     return stance_slip_speeds(p_WF, robot.foot_radius, FPS)
 
 
-def effort_metrics(rollout: Rollout, robot: Robot) -> dict[str, float]:
+def effort_metrics(rollout: Rollout, robot: Robot, damping: Array) -> dict[str, float]:
     """Returns metrics of the actuators by name.
 
-    With the torque of the PD, tau = kp (q_d - q) - kd v, clipped at the effort limit:
+    With the torque of the PD, tau = kp (q_d - q) - d v, clipped at the effort limit,
+    and the ``damping`` d of the PD in the plant, N m s/rad, shape (12,):
 
     - torque_saturation: share of samples and joints at the effort limit
     - speed_saturation: share of samples and joints at or beyond the speed limit
@@ -257,7 +258,7 @@ def effort_metrics(rollout: Rollout, robot: Robot) -> dict[str, float]:
     """
     q, base_and_joints = split(rollout.state)
     v = base_and_joints[JOINT_VELOCITIES]
-    asked = robot.kp * (rollout.desired_joints - q[JOINTS]) - robot.kd * v
+    asked = robot.kp * (rollout.desired_joints - q[JOINTS]) - damping * v
     torque = np.clip(asked, -robot.effort_limits, robot.effort_limits)
     power = float(np.abs(torque * v).sum(axis=1).mean())
     speed = float(np.linalg.norm(base_and_joints[VELOCITY][:, :2], axis=1).mean())

@@ -36,6 +36,7 @@ from loco_drake.evaluation.tracking import (
     slip_speeds,
     tracking_metrics,
 )
+from loco_drake.models.plant import plant_damping
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import any_label
 from loco_drake.retargeting.retarget import SegmentRetargeter
@@ -81,6 +82,7 @@ class _Runner:
     def __init__(self, scenario: Scenario, randomization: RandomizationConfig) -> None:
         self._robot = get_robot(scenario.robot)
         self._randomization = randomization
+        self._damping = plant_damping(self._robot, scenario.plant)
         self._recorder = Recorder(scenario)
         self._retarget = SegmentRetargeter(self._robot)
         # The first step sets up torch.
@@ -100,7 +102,8 @@ class _Runner:
         rollout, wall = self._recorder.run(duration)
         return Episode(
             trial=trial,
-            figures=tracking_metrics(rollout) | effort_metrics(rollout, self._robot),
+            figures=tracking_metrics(rollout)
+            | effort_metrics(rollout, self._robot, self._damping),
             slip=slip_speeds(rollout, self._robot),
             samples=len(rollout.state),
             fell=rollout.fell,

@@ -18,7 +18,7 @@ from loco_drake.control.state import (
     TerminationConfig,
     split,
 )
-from loco_drake.models.plant import PlantConfig
+from loco_drake.models.plant import PlantConfig, plant_damping
 from loco_drake.models.robots import get_robot
 from loco_drake.tracking.randomization import RandomizationConfig
 
@@ -83,6 +83,7 @@ class EnvironmentConfig:
         """Raises InputError unless every part is sound."""
         robot = get_robot(self.robot)
         self.plant.check()
+        plant_damping(robot, self.plant)
         self.termination.check()
         check_at_least("episode_steps", self.episode_steps, 1)
         for name, value in vars(self.reset_noise).items():

@@ -10,6 +10,7 @@ import torch
 from loco_drake import __version__
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import atomic_path
+from loco_drake.control.action import velocity_gain
 from loco_drake.control.actor import PRIVILEGED, Actor
 from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.datasets.registry import DATASETS
@@ -17,7 +18,8 @@ from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import any_label
 
 SET_POINTS = (
-    "every 1 / rate s: q_d = q + (kd v + tau) / kp + action_scale * action, v_d = 0; "
+    "every 1 / rate s: q_d = q + (velocity_gain v + tau) / kp + action_scale * action, "
+    "v_d = 0; "
     "q, v and the feed-forward torques tau are the plan's one period later; the motors "
     "give kp (q_d - q_measured) - kd v_measured"
 )
@@ -32,7 +34,8 @@ def policy_metadata(actor: Actor, robot: Robot) -> dict[str, str]:
       that make no difference to this policy
     - joint_names in the order of the action; standing_joints (rad), which joint
       positions are observed from; kp (Nm/rad) and kd (Nm s/rad) of the joints' PD
-    - action_scale (rad) and set_points: what becomes of an action
+    - action_scale (rad), velocity_gain (Nm s/rad) and set_points: what becomes of an
+      action and of the plan
     - licence: of the recordings that the policy was learned from
     """
     config = actor.config
@@ -55,6 +58,7 @@ def policy_metadata(actor: Actor, robot: Robot) -> dict[str, str]:
         "standing_joints": robot.stand_joints.tolist(),
         "kp": robot.kp.tolist(),
         "kd": robot.kd.tolist(),
+        "velocity_gain": velocity_gain(robot).tolist(),
         "action_scale": config.action_scale,
         "set_points": SET_POINTS,
         "licence": "The weights are under the conditions of the recordings that they "

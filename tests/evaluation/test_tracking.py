@@ -140,12 +140,12 @@ def test_effort_by_hand(perfect):
     perfect.desired_joints[:, 1] += 0.1
     perfect.state[:, 26] = 2.0
     perfect.desired_joints[:, 5] += 3.0
-    torque = go2.kp[1] * 0.1 - go2.kd[1] * 2.0
-    figures = effort_metrics(perfect, go2)
+    torque = go2.kp[1] * 0.1 - 2.5 * 2.0
+    figures = effort_metrics(perfect, go2, np.full(12, 2.5))
     assert figures["torque_saturation"] == pytest.approx(1 / 12)
     assert figures["speed_saturation"] == 0.0
     power = abs(torque) * 2.0  # the other joint does not move
     expected = power / (go2.mass * 9.81 * 0.7)
     assert figures["cost_of_transport"] == pytest.approx(expected)
     perfect.state[:, 25:] = -1.001 * go2.joint_speed_limits
-    assert effort_metrics(perfect, go2)["speed_saturation"] == 1.0
+    assert effort_metrics(perfect, go2, go2.kd)["speed_saturation"] == 1.0

@@ -18,6 +18,7 @@ from loco_drake.models.plant import (
     AddRobotPlant,
     ConfigureSimulator,
     PlantConfig,
+    plant_damping,
 )
 from loco_drake.models.robots import ROBOTS, AddRobotModel, get_robot
 from tests.models.trot import AddTrotSource
@@ -194,6 +195,41 @@ def test_desired_velocity_folded_into_the_position_is_the_same_pd():
     np.testing.assert_allclose(v_f, v, atol=1e-7)
     q_c, _ = hanging_robot("cenic", gains, (folded, np.zeros(12)))
     np.testing.assert_allclose(q_c, q, atol=0.005)
+
+
+@pytest.mark.parametrize("contact", ["similar", "lagged", "sap"])
+@pytest.mark.parametrize("step", [0.001, 0.002, 0.01, 0.03])
+def test_motors_damp_alike_at_every_step(contact, step):
+    """The torque of one step is kp (q_d - q) - 3 v', v' at its end, whatever the step.
+
+    In the air; the targets are near enough for no motor to saturate.
+    """
+    robot = get_robot("go2")
+    config = PlantConfig(contact=contact, time_step=step)
+    random = np.random.default_rng(0)
+    q_d = robot.stand_joints + random.uniform(-0.05, 0.05, 12)
+    simulator, plant, instance = build("go2", config, q_d)
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    q = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, *robot.stand_joints]
+    v = np.concatenate((np.zeros(6), random.uniform(-1.0, 1.0, 12)))
+    plant.SetPositionsAndVelocities(context, np.concatenate((q, v)))
+    torque = plant.get_net_actuation_output_port(instance).Eval(context).copy()
+    simulator.AdvanceTo(step)
+    turned = plant.GetVelocities(context)[6:]
+    expected = 100.0 * (q_d - robot.stand_joints) - 3.0 * turned
+    np.testing.assert_allclose(torque, expected, atol=1e-9)
+
+
+def test_damping_of_the_plant_by_hand():
+    """3 less 100 times the step; CENIC, whose steps have no error, has all of it."""
+    robot = get_robot("a1")
+    np.testing.assert_array_equal(plant_damping(robot, PlantConfig()), np.full(12, 2.0))
+    fine = plant_damping(robot, PlantConfig(time_step=0.002))
+    np.testing.assert_allclose(fine, 2.8, rtol=1e-15)
+    cenic = plant_damping(robot, PlantConfig(contact="cenic"))
+    np.testing.assert_array_equal(cenic, np.full(12, 3.0))
+    with pytest.raises(InputError, match=r"at most 0\.03 s for a1, not 0\.031"):
+        AddRobotPlant(DiagramBuilder(), robot, PlantConfig(time_step=0.031))
 
 
 @pytest.mark.parametrize("name", ROBOTS)

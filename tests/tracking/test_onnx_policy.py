@@ -74,10 +74,12 @@ def test_the_file_says_all_that_running_it_takes(exported):
     robot = get_robot("go2")
     assert joints == list(robot.joint_names)
     assert json.loads(metadata["standing_joints"]) == robot.stand_joints.tolist()
-    # The gains of the Go2's model: 100 Nm/rad and 2 Nm s/rad at every joint.
+    # The gains of the Go2's motors: 100 Nm/rad and 3 Nm s/rad at every joint.
     assert json.loads(metadata["kp"]) == [100.0] * 12
-    assert json.loads(metadata["kd"]) == [2.0] * 12
-    assert "(kd v + tau) / kp + action_scale * action" in metadata["set_points"]
+    assert json.loads(metadata["kd"]) == [3.0] * 12
+    assert json.loads(metadata["velocity_gain"]) == [2.0] * 12
+    formula = "(velocity_gain v + tau) / kp + action_scale * action"
+    assert formula in metadata["set_points"]
     assert "dog: CC BY-NC 4.0" in metadata["licence"]
     assert "horse: CC BY-SA 4.0" in metadata["licence"]
     assert "solo8" not in metadata["licence"]
