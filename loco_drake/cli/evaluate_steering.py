@@ -39,29 +39,34 @@ class EvaluateSteering(SimulatedEvaluation):
         from loco_drake.evaluation.steering_courses import Course
         from loco_drake.models.robots import get_robot
         from loco_drake.models.shipped import policy_path
+        from loco_drake.systems.steering import command_ranges
+
+        robot = get_robot(name)
+        trained = load_actor(policy_path(robot, self.policy), robot).config.labels
+        labels = [parse_label(label) for label in self.labels or trained]
+        ranges = {} if self.search else command_ranges(robot)
+        seeds = range(self.seed, self.seed + self.seeds)
+        return self._scenario(name, str(labels[0])), [
+            Course(str(label), seeds, ranges.get(label.index)) for label in labels
+        ]
+
+    def _scenario(self, name: str, label: str) -> "Scenario":
+        """Returns the scenario of a robot, which begins with the gait ``label``."""
+        from loco_drake.models.robots import get_robot
+        from loco_drake.models.shipped import policy_path
         from loco_drake.systems.scenario import (
             GeneratedReference,
             Scenario,
             SteeringConfig,
             TrainedPolicy,
         )
-        from loco_drake.systems.steering import command_ranges
 
-        robot = get_robot(name)
-        weights = policy_path(robot, self.policy)
-        trained = load_actor(weights, robot).config.labels
-        labels = [parse_label(label) for label in self.labels or trained]
-        scenario = Scenario(
+        return Scenario(
             robot=name,
-            reference=GeneratedReference(gait=str(labels[0]), duration=60.0),
+            reference=GeneratedReference(gait=label, duration=60.0),
             steering=SteeringConfig(measured_ranges=False),
-            policy=TrainedPolicy(weights=weights),
+            policy=TrainedPolicy(weights=policy_path(get_robot(name), self.policy)),
         )
-        ranges = {} if self.search else command_ranges(robot)
-        seeds = range(self.seed, self.seed + self.seeds)
-        return scenario, [
-            Course(str(label), seeds, ranges.get(label.index)) for label in labels
-        ]
 
     def evaluate(
         self, name: str, scenario: "Scenario", courses: "list[Course]"
@@ -87,6 +92,6 @@ class EvaluateSteering(SimulatedEvaluation):
         from loco_drake.evaluation.steering_pictures import steering_figures
 
         say_of(name)("Drawing")
-        scenario, _ = self.prepare(name)
+        scenario = self._scenario(name, next(iter(figures["labels"])))
         for title, picture in steering_figures(scenario, figures, self.seed):
             write_figure(picture, folder / f"{name}-{title}.png")

@@ -1,10 +1,8 @@
 """Steering: a plan whose ground path is bent until the base moves as commanded.
 
 The base keeps its height, its roll and pitch and its swaying within a stride; its mean
-velocity becomes the commanded one. A foot that stands is carried over by the transform
-of the path at the middle of its stance, and stays there. A foot that swings moves with
-the base, with an offset that goes smoothly from one foothold to the next. The legs
-follow in closed form.
+velocity becomes the commanded one. Feet that stand stay where they are, see
+:mod:`.footholds`. The legs follow in closed form.
 """
 
 from collections.abc import Iterator, Mapping
@@ -13,7 +11,7 @@ from itertools import groupby
 
 import numpy as np
 
-from loco_drake.common.arrays import Array, Bools, Integers
+from loco_drake.common.arrays import Array, Integers
 from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import (
     angular_velocity,
@@ -26,6 +24,7 @@ from loco_drake.common.rotations import (
 )
 from loco_drake.control.action import GRAVITY
 from loco_drake.control.command import ANY_COMMAND, CommandRange, check_finite
+from loco_drake.control.footholds import Bend, toe_offsets
 from loco_drake.control.ground_path import (
     filtered,
     ground_pose,
@@ -37,8 +36,6 @@ from loco_drake.control.plan import PLAN_DT, Plan, make_plan
 from loco_drake.control.state import JOINTS, ORIENTATION, POSITION
 from loco_drake.models.robots import Robot
 
-# Samples before touchdown from which a foot's landing no longer changes.
-_LATE = 6
 _REACH_TOLERANCE = 2e-3  # m by which a toe may miss its place
 # Shares of a command that are tried until legs and joints can follow it.
 _SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
@@ -164,24 +161,14 @@ def _bend(
     pose = np.concatenate(
         (before.pose[: last + 1], integrate(before.pose[last], velocity))
     )
-    turn = pose[:, 2] - raw_pose[:, 2]
     lean = _lean(robot, speed, natural, pose[:, 2])
-    carried = (
-        lean[:, None]
-        + pose[:, None, :2]
-        + rotate_plane(raw.p_WF[..., :2] - raw_pose[:, None, :2], turn[:, None])
-    )
-    offset = np.stack(
-        [
-            _foot_offset(before, raw, foot, raw_pose, pose, carried, lean, last)
-            for foot in range(4)
-        ],
-        axis=1,
-    )
+    bend = Bend(raw, raw_pose, pose, lean, last)
+    carried = bend.carried()
+    offset = toe_offsets(bend, carried, before.offset)
     p_WF = raw.p_WF.copy()
     p_WF[..., :2] = carried + offset
     q = raw.q.copy()
-    q[ORIENTATION] = quat_multiply(yaw_quat(turn), raw.q[ORIENTATION])
+    q[ORIENTATION] = quat_multiply(yaw_quat(bend.turn), raw.q[ORIENTATION])
     q[POSITION][:, :2] = pose[:, :2]
     p_BF = quat_rotate(
         quat_conjugate(q[ORIENTATION])[:, None], p_WF - q[POSITION][:, None]
@@ -238,82 +225,3 @@ def _lean(robot: Robot, speed: Array, natural: Array, yaw: Array) -> Array:
     along = -speed[:, 2] * speed[:, 1] + natural[:, 2] * natural[:, 1]
     inward = np.stack((along, centripetal), axis=-1)
     return rotate_plane(-robot.stand_height / GRAVITY * inward, yaw)
-
-
-def _foot_offset(
-    before: Steered,
-    raw: Plan,
-    foot: int,
-    raw_pose: Array,
-    pose: Array,
-    carried: Array,
-    lean: Array,
-    last: int,
-) -> Array:
-    """Returns the offset of one foot, unchanged up to sample ``last``, (N, 2)."""
-    toe, carried = raw.p_WF[:, foot, :2], carried[:, foot]
-    slope_toe, slope_carried = (np.gradient(a, axis=0) for a in (toe, carried))
-    old = before.offset[:, foot]
-    offset = np.zeros_like(toe)
-    offset[: last + 1] = old[: last + 1]
-    turn = pose[:, 2] - raw_pose[:, 2]
-    # Where a swing begins: sample, offset and its slope per sample.
-    begun = last
-    slope = old[min(last + 1, len(old) - 1)] - old[max(last - 1, 0)]
-    slope = slope / max(min(last + 1, len(old) - 1) - max(last - 1, 0), 1)
-    usual = 0  # samples of a stance that is complete
-    for start, end in _stances(raw.contacts[:, foot], last):
-        span = slice(max(start, last + 1), end + 1)
-        late = start - last <= _LATE and start < len(old)
-        if late:
-            # The foot stands already, or lands where it was going to.
-            swing = slice(last + 1, start)
-            offset[swing] = old[swing]
-            here = max(start, last)
-            placed = carried[here] + old[here]
-            angle = turn[here, None]
-            offset[span] = (
-                placed + rotate_plane(toe[span] - toe[here], angle) - carried[span]
-            )
-        else:
-            middle = (start + end) / 2
-            if end == len(toe) - 1 and raw.open_ended:
-                middle = max(middle, start + usual / 2)
-            angle = _between(turn[:, None], middle)
-            from_ = _between(raw_pose[:, :2], middle)
-            to = _between(pose[:, :2] + lean, middle)
-            offset[span] = to + rotate_plane(toe[span] - from_, angle) - carried[span]
-            there = rotate_plane(slope_toe[start], angle[0]) - slope_carried[start]
-            offset[begun + 1 : start] = _hermite(
-                offset[begun], slope, offset[start], there, start - begun
-            )
-        begun, usual = end, end - start
-        slope = rotate_plane(slope_toe[end], angle[0]) - slope_carried[end]
-    if begun < len(toe) - 1:
-        left = len(toe) - begun
-        offset[begun + 1 :] = _hermite(offset[begun], slope, 0 * slope, 0 * slope, left)
-    return offset
-
-
-def _stances(contact: Bools, last: int) -> Iterator[tuple[int, int]]:
-    """Yields first and last sample of the stances that end after sample ``last``."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], contact, [False]))))
-    for start, end in zip(edges[::2], edges[1::2] - 1, strict=True):
-        if end > last:
-            yield int(start), int(end)
-
-
-def _hermite(a: Array, slope_a: Array, b: Array, slope_b: Array, steps: int) -> Array:
-    """Returns the inner points of a cubic from ``a`` to ``b``, (steps - 1, 2)."""
-    x = (np.arange(1, steps) / steps)[:, None]
-    rest = 1 - x
-    return rest * rest * ((1 + 2 * x) * a + x * steps * slope_a) + x * x * (
-        (1 + 2 * rest) * b - rest * steps * slope_b
-    )
-
-
-def _between(rows: Array, index: float) -> Array:
-    """Returns the row of (N, D) at a fractional index, by linear interpolation."""
-    low = min(int(index), len(rows) - 1)
-    high = min(low + 1, len(rows) - 1)
-    return rows[low] + (index - low) * (rows[high] - rows[low])
