@@ -57,7 +57,12 @@ def pace(velocity: Array) -> Array:
 
 
 def filtered(
-    command: Array, speed: Array, rate: Array, response: float, count: int
+    command: Array,
+    speed: Array,
+    rate: Array,
+    response: float,
+    count: int,
+    steepest: Array | None = None,
 ) -> tuple[Array, Array]:
     """Returns how a critically damped filter follows a command from now on.
 
@@ -67,11 +72,26 @@ def filtered(
         rate: its time derivative, shape (3,).
         response: time in which 90 % of a step is covered, s.
         count: number of samples.
+        steepest: highest rate of each output, which large steps take longer to keep,
+            shape (3,); by default there is none.
 
     Returns:
         Output and its time derivative after 1 to ``count`` times PLAN_DT, both of shape
         (count, 3).
     """
+    output, slope = _critically_damped(command, speed, rate, response, count)
+    if steepest is not None:
+        for axis in np.flatnonzero((np.abs(slope) > steepest).any(axis=0)):
+            output[:, axis], slope[:, axis] = _limited(
+                command[axis], speed[axis], rate[axis], response, count, steepest[axis]
+            )
+    return output, slope
+
+
+def _critically_damped(
+    command: Array, speed: Array, rate: Array, response: float, count: int
+) -> tuple[Array, Array]:
+    """Returns :func:`filtered` without a limit; inputs are of any one shape (D,)."""
     omega = _NINETY_PERCENT / response
     t = PLAN_DT * np.arange(1, count + 1)[:, None]
     error = speed - command
@@ -79,3 +99,32 @@ def filtered(
     decay = np.exp(-omega * t)
     output = command + (error + slope * t) * decay
     return output, (slope - omega * (error + slope * t)) * decay
+
+
+def _limited(
+    command: float,
+    speed: float,
+    rate: float,
+    response: float,
+    count: int,
+    steepest: float,
+) -> tuple[Array, Array]:
+    """Returns output and rate, (count,), of a filter whose rate is limited.
+
+    Where the rate would be higher than ``steepest``, it is that one.
+    """
+    omega = _NINETY_PERCENT / response
+    decay = np.exp(-omega * PLAN_DT)
+    output, slope = np.empty((2, count))
+    for k in range(count):
+        error = speed - command
+        lead = error + (rate + omega * error) * PLAN_DT
+        after = (rate + omega * error - omega * lead) * decay
+        if abs(after) > steepest:
+            after = float(np.copysign(steepest, after))
+            speed += PLAN_DT * (rate + after) / 2
+        else:
+            speed = command + lead * decay
+        rate = after
+        output[k], slope[k] = speed, rate
+    return output, slope

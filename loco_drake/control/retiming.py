@@ -268,6 +268,12 @@ def _follow(robot: Robot, raw: Plan, window: slice, clock: Clock, start: float) 
     waypoints[ORIENTATION] = quat_continuous(waypoints[ORIENTATION])
     q = CubicSpline(times, waypoints)(s)
     q[ORIENTATION] /= np.linalg.norm(q[ORIENTATION], axis=1, keepdims=True)
+    # Between samples a spline may exceed limits that the plan keeps.
+    q[JOINTS] = np.clip(
+        q[JOINTS],
+        np.minimum(robot.joint_lower, waypoints[JOINTS].min(axis=0)),
+        np.maximum(robot.joint_upper, waypoints[JOINTS].max(axis=0)),
+    )
     v = np.stack([np.interp(s, times, column) for column in raw.v[window].T], axis=1)
     nearest = window.start + np.clip(
         np.rint((s - times[0]) / PLAN_DT).astype(int), 0, len(times) - 1

@@ -37,6 +37,9 @@ from loco_drake.control.state import JOINTS, ORIENTATION, POSITION
 from loco_drake.models.robots import Robot
 
 _REACH_TOLERANCE = 2e-3  # m by which a toe may miss its place
+# Highest rate of the filtered command along each axis, m/s^2; yaw has no limit. A robot
+# in a bound kept up with 3 m/s^2, but not with the 4.8 m/s^2 of a step of 2 m/s.
+_STEEPEST = np.array([3.0, 3.0, np.inf])
 # Shares of a command that are tried until legs and joints can follow it.
 _SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 
@@ -152,7 +155,7 @@ def _bend(
     """
     speed, rate = before.speed[: last + 1], before.rate[: last + 1]
     for label, count in _runs(raw.labels[last + 1 :]):
-        more = filtered(targets[label], speed[-1], rate[-1], response, count)
+        more = filtered(targets[label], speed[-1], rate[-1], response, count, _STEEPEST)
         speed, rate = (
             np.concatenate(ab) for ab in zip((speed, rate), more, strict=True)
         )

@@ -71,3 +71,37 @@ def test_ninety_per_cent_of_a_step_are_covered_after_the_response_time():
     assert x[29, 0] == pytest.approx(0.9, abs=1e-3)
     assert (np.diff(x[:, 0]) > 0).all()  # and never overshoots
     assert x.max() < 1
+
+
+def test_a_large_step_is_as_steep_as_the_limit_and_never_overshoots():
+    """2 m/s at 3 m/s^2, beside the same filter integrated in steps of 10 us."""
+    command, rest = np.array([2.0, 2.0, 0.3]), np.zeros(3)
+    steepest = np.array([3.0, np.inf, 3.0])
+    x, dx = filtered(command, rest, rest, 0.6, 100, steepest)
+    omega, dt, speed, rate = 3.8897 / 0.6, 1e-5, 0.0, 0.0
+    truth = []
+    for k in range(1, 100001):
+        if k % 2000 == 0:
+            truth.append((speed, rate))
+        wish = rate + dt * (omega**2 * (2.0 - speed) - 2 * omega * rate)
+        rate = min(wish, 3.0)
+        speed += dt * rate
+    np.testing.assert_allclose(x[:50, 0], [s for s, _ in truth], atol=0.02)
+    assert dx[:, 0].max() == 3.0
+    assert (np.diff(x[:, 0]) > 0).all()
+    assert x[:, 0].max() < 2
+    # Without a limit its rate is up to 2 omega / e. The other two keep their limits.
+    plain, _ = filtered(command, rest, rest, 0.6, 100)
+    assert np.diff(plain[:, 0]).max() / PLAN_DT == pytest.approx(4.77, abs=0.05)
+    np.testing.assert_array_equal(x[:, 1:], plain[:, 1:])
+
+
+@pytest.mark.parametrize("split", [3, 10, 20, 40])
+def test_a_limited_filter_that_is_stopped_goes_on_as_it_would_have(split):
+    command, steepest = np.array([2.5, -2.0, 1.0]), np.full(3, 3.0)
+    speed, rate = np.array([-0.5, 0.2, 0.0]), np.array([1.0, 0.0, 0.0])
+    whole = filtered(command, speed, rate, 0.6, 80, steepest)
+    head = filtered(command, speed, rate, 0.6, split, steepest)
+    tail = filtered(command, head[0][-1], head[1][-1], 0.6, 80 - split, steepest)
+    for parts, all_ in zip(zip(head, tail, strict=True), whole, strict=True):
+        np.testing.assert_allclose(np.concatenate(parts), all_, atol=1e-12)

@@ -157,6 +157,14 @@ def test_each_gait_keeps_its_own_range(go2):
     np.testing.assert_array_equal(result.command, [0.5, 0.0, 0.0])
 
 
+def test_a_large_step_accelerates_no_faster_than_a_robot_can(go2):
+    """From 1.5 m/s backwards: 3 m/s^2, where the filter alone would reach 4.8."""
+    trot = plan_from_motion(go2, synthetic_motion("dog-trot", 4.0, 1.5))
+    result = steered(go2, trot, (-0.5, 0.0, 0.0), fixed=1.0)
+    assert np.diff(result.speed[:, 0]).min() / PLAN_DT == pytest.approx(-3.0, abs=0.02)
+    assert result.speed[-1, 0] == pytest.approx(-0.5, abs=0.01)
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_a_command_that_is_not_finite_is_refused(go2, trot, bad):
     with pytest.raises(InputError, match="three finite numbers: forward and sideways"):

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
@@ -52,6 +54,24 @@ def test_what_is_played_keeps_the_limits_and_the_path(go2, trot):
         [np.interp(smooth.path_time, trot.path_time, x) for x in trot.q[:, 7:].T], 1
     )
     np.testing.assert_allclose(smooth.q[:, 7:], at, atol=0.03)
+
+
+def test_joints_stay_within_their_limits_between_samples(go2, trot):
+    """The calves rest at their limits, which a spline of the samples overshoots."""
+    limit = np.quantile(trot.q[:, 9::3], 0.8)
+    upper = np.where(np.arange(12) % 3 == 2, limit, go2.joint_upper)
+    q = trot.q.copy()
+    q[:, 7:] = np.minimum(q[:, 7:], upper)
+    robot, plan = replace(go2, joint_upper=upper), replace(trot, q=q)
+    smooth = smooth_plan(robot, plan, tight(robot, 0.08))
+    off = np.abs(smooth.path_time / PLAN_DT - np.rint(smooth.path_time / PLAN_DT))
+    assert (off > 0.1).mean() > 0.5  # most of what is played lies between samples
+    joints = smooth.q[:, 7:]
+    assert (joints <= upper).all()
+    assert (joints >= go2.joint_lower).all()
+    # As often at the limit as before.
+    at_limit, before = ((a[:, 2::3] == limit).mean() for a in (joints, q[:, 7:]))
+    assert at_limit > 0.3 * before
 
 
 def test_velocities_are_those_of_what_is_played(go2, trot):
