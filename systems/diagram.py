@@ -221,7 +221,8 @@ def _AddPlan(builder: DiagramBuilder, made: Locomotion, scenario: Scenario) -> N
     if scenario.smoother is not None:
         smoother = ToppraSmoother(made.robot, scenario.smoother)
         _Add(builder, "smoother", smoother, plan=chain[-1].GetOutputPort("plan"))
-        for system, name in product(chain, ("path_time", "fixed_time")):
+        ports = ("path_time", "fixed_time", "clock_rate")
+        for system, name in product(chain, ports):
             if system.HasInputPort(name):
                 builder.Connect(smoother.GetOutputPort(name), system.GetInputPort(name))
         chain.append(smoother)

@@ -21,6 +21,10 @@ from .scenario import SteeringConfig
 # A plan that was only extended is steered again from this long before its old end, s:
 # its pace and its last stances were not known yet.
 _UNSURE = 1.5
+# A clock that is slower than this counts as this.
+_SLOWEST = 0.5
+# A plan is steered again if its clock changes by this.
+_CHANGED = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +34,7 @@ class _Course(Immutable):
     plan: Plan  # as in ``steered``; standing before the first command
     steered: Steered | None = None  # None before the first command
     command: tuple[float, ...] = ()
+    clock_rate: float = 1.0  # at the last update that steered
 
 
 def command_ranges(robot: Robot) -> dict[int, CommandRange]:
@@ -57,6 +62,7 @@ class Steering(PlanProducer):
         - plan: abstract, Plan
         - command: vector (3,), forward, sideways, yaw rate in H; m/s, rad/s; optional
         - fixed_time: vector (1,), plan time up to which nothing changes; s; optional
+        - clock_rate: vector (1,), seconds of the plan per second; optional
         output_ports:
         - plan: abstract, Plan; on the clock of the input
         - followed: vector (3,), the command as far as it is followed; m/s, rad/s
@@ -68,8 +74,9 @@ class Steering(PlanProducer):
     output is the input itself, and ``followed`` is 0.
 
     The command is sampled every ``UPDATE_PERIOD`` into the state, of which the outputs
-    are functions. ``fixed_time`` comes from the smoother; without it the Context's time
-    is used.
+    are functions. ``fixed_time`` and ``clock_rate`` come from the smoother; without
+    them the Context's time and 1 are used. A plan that is slowed moves faster by its
+    own clock, so that the robot moves as commanded.
 
     Args:
         robot: the robot.
@@ -90,6 +97,7 @@ class Steering(PlanProducer):
         self._plan = self.DeclareAbstractInputPort("plan", Value(rest))
         self._command = self.DeclareVectorInputPort("command", 3)
         self._fixed_time = self.DeclareVectorInputPort("fixed_time", 1)
+        self._clock_rate = self.DeclareVectorInputPort("clock_rate", 1)
         self._DeclarePlan(_Course(rest), self._plan.ticket())
         self.DeclareVectorOutputPort(
             "followed", 3, self._calc_followed, prerequisites_of_calc={self.xa_ticket()}
@@ -102,8 +110,11 @@ class Steering(PlanProducer):
         )
 
     def _calc_followed(self, context: Context, output: Any) -> None:
-        steered = self._get(context).steered
-        output.set_value([0.0] * 3 if steered is None else steered.command)
+        course = self._get(context)
+        if course.steered is None:
+            output.set_value([0.0] * 3)
+        else:
+            output.set_value(course.clock_rate * course.steered.command)
 
     def _next(self, context: Context, course: _Course) -> _Course:
         if not self._command.HasValue(context):
@@ -113,13 +124,19 @@ class Steering(PlanProducer):
         fixed = context.get_time()
         if self._fixed_time.HasValue(context):
             fixed = float(self._fixed_time.Eval(context)[0])
+        clock_rate = 1.0
+        if self._clock_rate.HasValue(context):
+            clock_rate = max(float(self._clock_rate.Eval(context)[0]), _SLOWEST)
         steered = course.steered
         if steered is not None:
             changed = first_change(steered.raw, raw)
             if changed <= fixed:
                 # Another motion, which the smoother plays from its beginning.
                 steered, fixed = None, float(raw.path_time[0])
-            elif tuple(command) == course.command:
+            elif (
+                tuple(command) == course.command
+                and abs(clock_rate - course.clock_rate) < _CHANGED
+            ):
                 if raw is steered.raw:
                     return course
                 fixed = max(fixed, changed - _UNSURE)
@@ -131,5 +148,6 @@ class Steering(PlanProducer):
             fixed,
             self._config.response,
             self._ranges,
+            clock_rate,
         )
-        return _Course(steered.plan, steered, tuple(command))
+        return _Course(steered.plan, steered, tuple(command), clock_rate)

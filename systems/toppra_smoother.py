@@ -31,6 +31,7 @@ class ToppraSmoother(PlanProducer):
         - plan: abstract, Plan; smoothed
         - path_time: vector (1,), how much of the input has been used; s
         - fixed_time: vector (1,), plan time up to which the output is final; s
+        - clock_rate: vector (1,), seconds of the input per second; mean of the output
 
     The output is on the Context's clock and is never faster than the input. It is
     extended by one chunk whenever it reaches less than ``lookahead`` ahead and the
@@ -72,6 +73,12 @@ class ToppraSmoother(PlanProducer):
             self._calc_fixed_time,
             prerequisites_of_calc={self.xa_ticket(), self.time_ticket()},
         )
+        self.DeclareVectorOutputPort(
+            "clock_rate",
+            1,
+            self._calc_clock_rate,
+            prerequisites_of_calc={self.xa_ticket()},
+        )
         self.DeclareInitializationUnrestrictedUpdateEvent(self._initialize)
 
     def _calc_path_time(self, context: Context, output: Any) -> None:
@@ -82,6 +89,9 @@ class ToppraSmoother(PlanProducer):
         # must then not be played before the one after it.
         plan = self._get(context).plan
         output[0] = plan.path_time[plan.index(context.get_time() + 2 * UPDATE_PERIOD)]
+
+    def _calc_clock_rate(self, context: Context, output: Any) -> None:
+        output[0] = self._get(context).rate.mean()
 
     def _initialize(self, context: Context, state: State) -> None:
         # The clone of a Context that has run continues as the original would.

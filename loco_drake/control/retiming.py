@@ -31,6 +31,8 @@ toppra.setup_logging("ERROR")
 # decelerates the whole robot, which cannot brake in the air, nor on the ground beyond
 # friction.
 _CLOCK_STOP_TIME = 0.5
+# Joints that are beyond their limits by less are left as they are, rad.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -271,8 +273,8 @@ def _follow(robot: Robot, raw: Plan, window: slice, clock: Clock, start: float) 
     # Between samples a spline may exceed limits that the plan keeps.
     q[JOINTS] = np.clip(
         q[JOINTS],
-        np.minimum(robot.joint_lower, waypoints[JOINTS].min(axis=0)),
-        np.maximum(robot.joint_upper, waypoints[JOINTS].max(axis=0)),
+        np.minimum(robot.joint_lower, waypoints[JOINTS].min(axis=0)) - _ROUNDING,
+        np.maximum(robot.joint_upper, waypoints[JOINTS].max(axis=0)) + _ROUNDING,
     )
     v = np.stack([np.interp(s, times, column) for column in raw.v[window].T], axis=1)
     nearest = window.start + np.clip(

@@ -36,7 +36,10 @@ from loco_drake.control.plan import PLAN_DT, Plan, make_plan
 from loco_drake.control.state import JOINTS, ORIENTATION, POSITION
 from loco_drake.models.robots import Robot
 
-_REACH_TOLERANCE = 2e-3  # m by which a toe may miss its place
+# By how much toes that stand, and any below the ground, may miss their place, m.
+_REACH_TOLERANCE = 2e-3
+# The same of toes that swing: a leg that is folded as far as it goes does no harm.
+_SWING_TOLERANCE = 20e-3
 # Highest rate of the filtered command along each axis, m/s^2; yaw has no limit. A robot
 # in a bound kept up with 3 m/s^2, but not with the 4.8 m/s^2 of a step of 2 m/s.
 _STEEPEST = np.array([3.0, 3.0, np.inf])
@@ -53,7 +56,8 @@ class Steered(Immutable):
 
     raw: Plan  # the plan before steering
     plan: Plan  # the plan after steering, on the same clock
-    command: Array  # the command of the last gait as far as it is followed, (3,)
+    # The command of the last gait as far as it is followed, on the plan's clock, (3,).
+    command: Array
     speed: Array  # filtered command, m/s and rad/s, shape (N, 3)
     rate: Array  # time derivative of ``speed``, shape (N, 3)
     pose: Array  # of the base on the ground, x, y, yaw, shape (N, 3)
@@ -78,6 +82,7 @@ def steer(
     fixed: float,
     response: float,
     ranges: Mapping[int, CommandRange] | None = None,
+    clock_rate: float = 1.0,
 ) -> Steered:
     """Returns ``raw`` steered by a command, continuing ``before``.
 
@@ -94,6 +99,7 @@ def steer(
         fixed: plan time up to which the plan must not change, s.
         response: time in which 90 % of a step of the command is covered, s.
         ranges: range of commands of each gait, by its row of gaits.ONE_HOT.
+        clock_rate: seconds of the plan that are played per second, above 0.
 
     Raises:
         InputError: if a number of the command is not finite.
@@ -107,7 +113,7 @@ def steer(
     natural = pace(path_velocity(raw_pose))
     now = natural[last:].mean(axis=0)
     wanted = {
-        label: (ranges or {}).get(label, ANY_COMMAND).clip(command)
+        label: (ranges or {}).get(label, ANY_COMMAND).clip(command) / clock_rate
         for label in np.unique(raw.labels[last:]).tolist()
     }
     best: tuple[float, Steered] | None = None
@@ -197,14 +203,17 @@ def _bend(
         path_time=raw.path_time,
         open_ended=raw.open_ended,
     )
-    missed = robot.toe_positions(q[last + 1 :, 7:]) - p_BF[last + 1 :]
+    missed = np.abs(plan.p_WF - p_WF)[last + 1 :].max(axis=-1)
+    tolerated = np.where(raw.contacts, _REACH_TOLERANCE, _SWING_TOLERANCE)[last + 1 :]
+    sunk = np.minimum(p_WF[..., 2], robot.foot_radius) - plan.p_WF[..., 2]
     # The smoother slows what is too fast already.
     fast, raw_fast = (
         np.abs(each.v[last + 1 :, 6:] / robot.joint_speed_limits).max(initial=0.0)
         for each in (plan, raw)
     )
     excess = max(
-        np.abs(missed).max(initial=0.0) / _REACH_TOLERANCE - 1,
+        (missed / tolerated).max(initial=0.0) - 1,
+        sunk[last + 1 :].max(initial=0.0) / _REACH_TOLERANCE - 1,
         fast - max(raw_fast, 1.0),
     )
     command = targets[int(raw.labels[-1])]

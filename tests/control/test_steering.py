@@ -7,7 +7,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import angular_velocity
 from loco_drake.control.command import ANY_COMMAND, CommandRange
 from loco_drake.control.ground_path import ground_pose, path_velocity
-from loco_drake.control.plan import PLAN_DT, plan_from_motion
+from loco_drake.control.plan import PLAN_DT, make_plan, plan_from_motion
 from loco_drake.control.steering import begin, steer
 from tests.synthetic_motion import synthetic_motion
 
@@ -137,6 +137,24 @@ def test_what_legs_cannot_do_is_followed_as_far_as_they_can(go2, trot):
     senseless = steered(go2, trot, (1e9, -1e9, 1e9))
     assert (np.abs(senseless.command) <= ANY_COMMAND.high).all()
     assert np.isfinite(senseless.plan.q).all()
+
+
+def test_a_swing_leg_that_is_folded_as_far_as_it_goes_does_not_hold_a_command_back(go2):
+    """Calves reach their limits in mid-swing; a faster trot would fold them more."""
+    trot = plan_from_motion(go2, synthetic_motion("dog-trot", 4.0, 0.5))
+    calves = trot.q[:, 9::3]
+    limit = calves.min() + 0.1 * np.ptp(calves)
+    lower = np.where(np.arange(12) % 3 == 2, limit, go2.joint_lower)
+    robot = replace(go2, joint_lower=lower)
+    q = trot.q.copy()
+    q[:, 7:] = np.maximum(q[:, 7:], lower)
+    folded = make_plan(robot, q=q, v=trot.v, contacts=trot.contacts, labels=trot.labels)
+    assert not (trot.contacts & (calves < limit)).any()
+    result = steered(robot, folded, (0.9, 0.0, 0.3))
+    np.testing.assert_array_equal(result.command, [0.9, 0.0, 0.3])
+    assert (result.plan.q[:, 7:] >= lower).all()
+    assert stance_speeds(result.plan).max() < stance_speeds(folded).max() + 2e-3
+    assert result.plan.p_WF[..., 2].min() > folded.p_WF[..., 2].min() - 2e-3
 
 
 def test_each_gait_keeps_its_own_range(go2):

@@ -41,7 +41,7 @@ def build(robot, reference, limits=None, steering=True):
     smoother = ToppraSmoother(robot, limits=limits)
     add(builder, "smoother", smoother, chain[-1].GetOutputPort("plan"))
     for system in chain:
-        for name in ("path_time", "fixed_time"):
+        for name in ("path_time", "fixed_time", "clock_rate"):
             if system.HasInputPort(name):
                 builder.Connect(smoother.GetOutputPort(name), system.GetInputPort(name))
     if reference.HasInputPort("gait"):
@@ -117,14 +117,29 @@ def test_the_plan_follows_a_step_of_the_command_within_a_second(played):
     np.testing.assert_allclose(velocity[after].mean(axis=0), [0.3, 0.1, 0.8], atol=0.03)
 
 
+def tight(robot):
+    """Limits that the smoother keeps by slowing a trot."""
+    limits = path_limits(robot)
+    acceleration = limits.acceleration.copy()
+    acceleration[:12] *= 0.08
+    return PathLimits(limits.speed, acceleration)
+
+
+def test_a_plan_that_is_slowed_moves_as_commanded(go2, long_trot):
+    """In seconds that pass, of which its clock counts fewer."""
+    command = [0.6, 0.05, 0.3]
+    diagram = build(go2, PlanPlayer(go2, long_trot), tight(go2))
+    q, plans = run(diagram, [(0.0, command)], 6.0)
+    plan = plans[-1]
+    assert np.diff(plan.path_time).mean() < 0.96 * PLAN_DT
+    velocity = path_velocity(ground_pose(q))[100:]
+    np.testing.assert_allclose(velocity.mean(axis=0), command, atol=0.012)
+
+
 @pytest.mark.parametrize("slow", [False, True])
 def test_the_first_sample_that_differs_is_due_within_three_tenths(go2, long_trot, slow):
     """Also while TOPP-RA is slowing the plan."""
-    limits = path_limits(go2)
-    if slow:
-        acceleration = limits.acceleration.copy()
-        acceleration[:12] *= 0.08
-        limits = PathLimits(limits.speed, acceleration)
+    limits = tight(go2) if slow else path_limits(go2)
     diagram = build(go2, PlanPlayer(go2, long_trot), limits)
     ours, plans = run(diagram, [(0.0, [0.6, 0.0, 0.0])], 2.5)
     if slow:
