@@ -151,7 +151,9 @@ def AddLocomotion(
     if isinstance(scenario.policy, ExternalTargets):
         made.inputs["desired_state"] = desired_state
     else:
-        _AddPlan(builder, made, scenario)
+        inputs, outputs = AddPlan(builder, robot, scenario)
+        made.inputs.update(inputs)
+        made.outputs.update(outputs)
         _AddControl(builder, made, scenario, measured, desired_state)
         _AddScores(builder, made, state)
     made.outputs["state"] = state
@@ -206,27 +208,33 @@ def _AddDisturbances(
     return state, desired_state
 
 
-def _AddPlan(builder: DiagramBuilder, made: Locomotion, scenario: Scenario) -> None:
-    """Adds the reference, its steering and the smoother."""
-    reference = _Add(builder, "reference", _MakeReference(made.robot, scenario))
-    chain = [reference]
+def AddPlan(
+    builder: DiagramBuilder, robot: Robot, scenario: Scenario
+) -> tuple[dict[str, InputPort], dict[str, OutputPort]]:
+    """Adds reference, steering and smoother, which depend on no robot's state.
+
+    Returns their input and output ports by name, see :func:`MakeLocomotionDiagram`.
+    """
+    reference = _Add(builder, "reference", _MakeReference(robot, scenario))
+    inputs, outputs, chain = {}, {}, [reference]
     if reference.HasInputPort("gait"):
-        made.inputs["gait"] = reference.GetInputPort("gait")
+        inputs["gait"] = reference.GetInputPort("gait")
     if scenario.steering is not None:
-        steering = Steering(made.robot, scenario.steering)
+        steering = Steering(robot, scenario.steering)
         _Add(builder, "steering", steering, plan=chain[-1].GetOutputPort("plan"))
-        made.inputs["command"] = steering.GetInputPort("command")
-        made.outputs["followed"] = steering.GetOutputPort("followed")
+        inputs["command"] = steering.GetInputPort("command")
+        outputs["followed"] = steering.GetOutputPort("followed")
         chain.append(steering)
     if scenario.smoother is not None:
-        smoother = ToppraSmoother(made.robot, scenario.smoother)
+        smoother = ToppraSmoother(robot, scenario.smoother)
         _Add(builder, "smoother", smoother, plan=chain[-1].GetOutputPort("plan"))
         ports = ("path_time", "fixed_time", "clock_rate")
         for system, name in product(chain, ports):
             if system.HasInputPort(name):
                 builder.Connect(smoother.GetOutputPort(name), system.GetInputPort(name))
         chain.append(smoother)
-    made.outputs["plan"] = chain[-1].GetOutputPort("plan")
+    outputs["plan"] = chain[-1].GetOutputPort("plan")
+    return inputs, outputs
 
 
 def _MakeReference(robot: Robot, scenario: Scenario) -> LeafSystem:

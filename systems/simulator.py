@@ -145,14 +145,18 @@ def StartEpisode(
     context.SetTime(0.0)
     if domain is not None:
         SetDomain(chosen, context, domain)
-    _set_reference(chosen, context, gait=gait, seed=seed, plan=plan)
+    SetReference(chosen, context, gait=gait, seed=seed, plan=plan)
     for part in parts:
         _place_on_plan(part, context)
     simulator.Initialize()
 
 
-def _set_reference(diagram: Diagram, root: Context, **given: Any) -> None:
-    """Passes the arguments that are not None to the reference."""
+def SetReference(diagram: Diagram, root: Context, **given: Any) -> None:
+    """Passes gait, seed or plan, where they are not None, to the reference.
+
+    Raises:
+        InputError: if the reference does not accept an argument.
+    """
     given = {name: value for name, value in given.items() if value is not None}
     if not given:
         return

@@ -1,17 +1,20 @@
 """The command ``evaluate tracking``."""
 
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 from loco_drake.cli.evaluation import SimulatedEvaluation, print_by_label
-from loco_drake.cli.options import Policy
+from loco_drake.cli.options import Policy, option
 from loco_drake.cli.output import tracked
-from loco_drake.common.errors import check_choice
+from loco_drake.common.errors import InputError, check_choice
 from loco_drake.motion.gaits import any_label, parse_label
 from loco_drake.tracking.randomization import RandomizationConfig
 
 if TYPE_CHECKING:
     from loco_drake.evaluation.tracking_table import Trial
+    from loco_drake.models.mujoco_plant import MujocoConfig
+    from loco_drake.models.plant import PlantConfig
     from loco_drake.systems.scenario import Scenario
 
 
@@ -29,10 +32,16 @@ class EvaluateTracking(SimulatedEvaluation):
     # Length of each episode in s; at most the length of a recording.
     duration: float = 10.0
     policy: Policy = None
-    # Contact solver: similar, lagged, sap or cenic.
+    # drake, or mujoco, which needs the extra 'mujoco'; see docs/mujoco.md.
+    simulator: str = "drake"
+    # With --simulator mujoco: MJCF file of another model of the robot.
+    mjcf: Path | None = None
+    # Contact solver of Drake: similar, lagged, sap or cenic.
     contact: str = "similar"
-    # Time step of the physics, s.
-    time_step: float = 0.01
+    time_step: Annotated[
+        float | None,
+        option("Time step of the physics, s.", default="0.01; with mujoco 0.002"),
+    ] = None
     # Accuracy of the integrator of cenic.
     accuracy: float = 1e-4
     # Coulomb friction coefficient of the ground.
@@ -57,6 +66,7 @@ class EvaluateTracking(SimulatedEvaluation):
 
         super().check()
         check_choice("reference", self.reference, ("generated", "retargeted"))
+        check_choice("simulator", self.simulator, ("drake", "mujoco"))
         check_duration(self.duration)
         if self.pushes:
             self.randomization = replace(
@@ -67,6 +77,35 @@ class EvaluateTracking(SimulatedEvaluation):
         if self.randomize:
             self.randomization = self.randomization.with_standard()
         self.randomization.check()
+        if self.simulator == "mujoco":
+            self._mujoco().check()
+        elif self.mjcf is not None:
+            raise InputError("--mjcf is a model for MuJoCo: add --simulator mujoco.")
+
+    def _mujoco(self) -> "MujocoConfig":
+        """Returns the configuration of MuJoCo."""
+        from loco_drake.models.mujoco_plant import MujocoConfig
+
+        if self.contact != "similar" or not self.randomization.is_off:
+            raise InputError(
+                "--contact, --pushes and --randomize change Drake's world, and cannot "
+                "be used with --simulator mujoco."
+            )
+        config = MujocoConfig(friction=self.friction, mjcf=self.mjcf)
+        if self.time_step is not None:
+            config.time_step = self.time_step
+        return config
+
+    def _plant(self) -> "PlantConfig":
+        """Returns the configuration of Drake's plant."""
+        from loco_drake.models.plant import PlantConfig
+
+        config = PlantConfig(
+            contact=self.contact, accuracy=self.accuracy, friction=self.friction
+        )
+        if self.time_step is not None and self.simulator == "drake":
+            config.time_step = self.time_step
+        return config
 
     def prepare(self, name: str) -> "tuple[Scenario, list[Trial]]":
         """Returns what to simulate for a robot."""
@@ -74,7 +113,7 @@ class EvaluateTracking(SimulatedEvaluation):
         from loco_drake.datasets.registry import data_dir
         from loco_drake.datasets.segments import read_segments
         from loco_drake.evaluation import tracking_table
-        from loco_drake.models.plant import PlantConfig, plant_damping
+        from loco_drake.models.plant import plant_damping
         from loco_drake.models.robots import get_robot
         from loco_drake.models.shipped import policy_path
         from loco_drake.systems import scenario as systems
@@ -84,12 +123,7 @@ class EvaluateTracking(SimulatedEvaluation):
         trained = load_actor(weights, robot).config.labels
         parse = any_label if self.reference == "retargeted" else parse_label
         labels = [str(parse(label)) for label in self.labels or trained]
-        plant = PlantConfig(
-            contact=self.contact,
-            time_step=self.time_step,
-            accuracy=self.accuracy,
-            friction=self.friction,
-        )
+        plant = self._plant()
         plant.check()
         plant_damping(robot, plant)
         policy = systems.TrainedPolicy(weights=weights)
@@ -112,12 +146,17 @@ class EvaluateTracking(SimulatedEvaluation):
         """Returns the figures of one robot."""
         from loco_drake.evaluation.tracking_table import run_trials, summarize
 
-        episodes = run_trials(scenario, trials, self.workers, self.randomization)
+        mujoco = self._mujoco() if self.simulator == "mujoco" else None
+        episodes = run_trials(
+            scenario, trials, self.workers, self.randomization, mujoco
+        )
         return {
             "robot": name,
             "reference": self.reference,
-            "contact": self.contact,
-            "time_step_s": self.time_step,
+            "simulator": self.simulator,
+            "mjcf": self.mjcf and self.mjcf.name,
+            "contact": self.contact if mujoco is None else "elliptic",
+            "time_step_s": (mujoco or scenario.plant).time_step,
             "friction": self.friction,
             "duration_s": self.duration,
             "randomization": asdict(self.randomization),
@@ -128,7 +167,8 @@ class EvaluateTracking(SimulatedEvaluation):
         """Prints a table of all labels; returns 0."""
         world = "" if self.randomization.is_off else ", randomized"
         title = (
-            f"{name}, {self.reference}, {self.contact}{world}: "
+            f"{name}, {self.reference}, {figures['simulator']}, {figures['contact']}"
+            f"{world}: "
             f"{figures['real_time_factor']:.1f} times real time"
         )
         rows = {**figures["labels"], "all of these": figures["all"]}

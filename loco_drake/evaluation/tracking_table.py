@@ -30,12 +30,14 @@ from loco_drake.common.parallel import map_in_workers
 from loco_drake.control.plan import PLAN_DT, plan_from_motion
 from loco_drake.datasets.segments import Segment, select_labels
 from loco_drake.evaluation.motion_scores import median
+from loco_drake.evaluation.mujoco import MujocoRecorder
 from loco_drake.evaluation.tracking import (
     Recorder,
     effort_metrics,
     slip_speeds,
     tracking_metrics,
 )
+from loco_drake.models.mujoco_plant import MujocoConfig
 from loco_drake.models.plant import plant_damping
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import any_label
@@ -79,11 +81,21 @@ class Episode:
 class _Runner:
     """Simulates one trial after the other in one diagram."""
 
-    def __init__(self, scenario: Scenario, randomization: RandomizationConfig) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        randomization: RandomizationConfig,
+        mujoco: MujocoConfig | None,
+    ) -> None:
         self._robot = get_robot(scenario.robot)
         self._randomization = randomization
-        self._damping = plant_damping(self._robot, scenario.plant)
-        self._recorder = Recorder(scenario)
+        self._recorder: Recorder | MujocoRecorder
+        if mujoco is None:
+            self._damping = plant_damping(self._robot, scenario.plant)
+            self._recorder = Recorder(scenario)
+        else:
+            self._damping = self._robot.kd
+            self._recorder = MujocoRecorder(scenario, mujoco)
         self._retarget = SegmentRetargeter(self._robot)
         # The first step sets up torch.
         self._recorder.start()
@@ -92,13 +104,16 @@ class _Runner:
     def __call__(self, trial: Trial) -> Episode:
         duration = trial.duration
         random = np.random.default_rng((trial.seed, any_label(trial.label).index))
-        domain = self._randomization.draw(self._robot, random, 0.0, duration)
+        episode: dict[str, Any] = {}
+        if not self._randomization.is_off:
+            domain = self._randomization.draw(self._robot, random, 0.0, duration)
+            episode["domain"] = domain
         if trial.segment is None:
-            self._recorder.start(gait=trial.label, seed=trial.seed, domain=domain)
+            self._recorder.start(gait=trial.label, seed=trial.seed, **episode)
         else:
             plan = self._plan(trial.segment)
             duration = min(duration, plan.end_time)
-            self._recorder.start(plan=plan, domain=domain)
+            self._recorder.start(plan=plan, **episode)
         rollout, wall = self._recorder.run(duration)
         return Episode(
             trial=trial,
@@ -146,6 +161,7 @@ def run_trials(
     trials: Sequence[Trial],
     workers: int = 1,
     randomization: RandomizationConfig | None = None,
+    mujoco: MujocoConfig | None = None,
 ) -> Iterator[Episode]:
     """Simulates trials and yields their results in order.
 
@@ -155,6 +171,7 @@ def run_trials(
         trials: trials, all of one kind.
         workers: number of processes.
         randomization: distribution of each trial's world, by its label and seed.
+        mujoco: simulates in MuJoCo, where nothing is randomized, instead of Drake.
     """
     randomization = randomization or RandomizationConfig()
     randomization.check(get_robot(scenario.robot), scenario.plant)
@@ -162,7 +179,10 @@ def run_trials(
     recorded = isinstance(scenario.reference, PlanReference)
     if any((trial.segment is not None) != recorded for trial in trials):
         raise ValueError("the trials are not of the scenario's kind of reference")
-    return map_in_workers(partial(_Runner, scenario, randomization), trials, workers)
+    if mujoco is not None and not randomization.is_off:
+        raise ValueError("worlds are randomized in Drake only")
+    make = partial(_Runner, scenario, randomization, mujoco)
+    return map_in_workers(make, trials, workers)
 
 
 def summarize(episodes: Sequence[Episode]) -> dict[str, Any]:

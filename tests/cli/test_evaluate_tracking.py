@@ -1,4 +1,5 @@
 import json
+import sys
 
 import pytest
 
@@ -85,3 +86,65 @@ def test_recordings_of_any_label_can_be_followed(made_data, tmp_path, capsys):
     assert list(json.loads(path.read_text())["labels"]) == ["dog-turn_left"]
     assert main([*line, "dog-hop"]) == 2
     assert "'dog-hop'; the choices are dog-pace" in capsys.readouterr().err
+
+
+def test_mujoco_gives_the_same_figures(tmp_path, capsys):
+    """Under the same keys; a model written by export is taken as somebody else's."""
+    pytest.importorskip("mujoco", reason="needs the extra 'mujoco'")
+    model, path = tmp_path / "go2.xml", tmp_path / "figures.json"
+    assert main(["export", "--mjcf", str(model)]) == 0
+    assert not list(tmp_path.glob("*.onnx"))
+    line = "evaluate tracking --simulator mujoco --labels dog-pace --seeds 1"
+    line += f" --duration .4 --json {path}"
+    results = []
+    for more in ([], ["--mjcf", str(model)]):
+        assert main([*line.split(), *more]) == 0
+        results.append(json.loads(path.read_text()))
+    first, second = results
+    assert (first["simulator"], first["time_step_s"]) == ("mujoco", 0.002)
+    assert (first["mjcf"], second["mjcf"]) == (None, "go2.xml")
+    assert first["labels"] == second["labels"]
+    assert set(first["all"]) >= KEYS
+    assert first["all"]["normalized_return"] > 80
+    assert "go2, generated, mujoco" in capsys.readouterr().out
+
+
+def test_recordings_can_be_followed_in_mujoco(made_data, tmp_path):
+    pytest.importorskip("mujoco", reason="needs the extra 'mujoco'")
+    path = tmp_path / "figures.json"
+    line = "evaluate tracking --simulator mujoco --reference retargeted --seeds 1"
+    line += f" --labels dog-trot --duration .4 --data-dir {made_data} --json {path}"
+    assert main(line.split()) == 0
+    figures = json.loads(path.read_text())
+    assert figures["reference"] == "retargeted"
+    assert figures["all"]["normalized_return"] > 70
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--simulator gazebo", "choices are drake, mujoco"),
+        ("--mjcf a.xml", "add --simulator mujoco"),
+        ("--simulator mujoco --pushes", "cannot be used with --simulator mujoco"),
+        ("--simulator mujoco --contact sap", "cannot be used with --simulator mujoco"),
+        ("--simulator mujoco --mjcf nowhere.xml", "no MJCF file 'nowhere.xml'"),
+        ("--simulator mujoco --time-step .02", "time_step must be a number from"),
+        ("--simulator mujoco --time-step .003", "must divide 0.02 s, as 0.002 does"),
+        ("--time-step .04", "time_step must be at most 0.03 s for go2, not 0.04"),
+    ],
+)
+def test_options_of_the_other_simulator_are_refused(options, message, capsys):
+    pytest.importorskip("mujoco", reason="needs the extra 'mujoco'")
+    assert main(["evaluate", "tracking", *options.split()]) == 2
+    error = capsys.readouterr().err.strip()
+    assert message in error
+    assert len(error.splitlines()) == 1
+
+
+def test_without_mujoco_one_sentence_says_what_to_install(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    assert main(["evaluate", "tracking", "--simulator", "mujoco"]) == 2
+    assert capsys.readouterr().err == (
+        "loco-drake: To simulate in MuJoCo, install the package mujoco, the extra "
+        "'mujoco' of loco_drake.\n"
+    )

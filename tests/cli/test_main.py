@@ -108,6 +108,8 @@ WRONG = {
     "simulate --policy FILES/policy_of_a1.safetensors": "another robot: a1, not go2",
     "export --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
     "export --out policy.txt": "--out must end in .onnx, not 'policy.txt'",
+    "export --mjcf go2.urdf": "--mjcf must end in .xml, not 'go2.urdf'",
+    "export --mjcf go2.xml --policy robust": "are of a policy: add --out",
     "export --policy FILES/none.safetensors": "There are no policy weights at",
     "export --robot go2 --policy robust": "no shipped policy of go2 has that name",
     "export --policy FILES/policy_of_a1.safetensors": "another robot: a1, not go2",
