@@ -11,7 +11,6 @@ from toppra.interpolator import AbstractGeometricPath
 
 from loco_drake.common.arrays import Array
 from loco_drake.common.immutable import Immutable
-from loco_drake.common.rotations import quat_continuous
 from loco_drake.control.action import GRAVITY
 from loco_drake.control.plan import (
     PLAN_DT,
@@ -21,7 +20,8 @@ from loco_drake.control.plan import (
     make_plan,
     standing_plan,
 )
-from loco_drake.control.state import HEIGHT, JOINTS, ORIENTATION
+from loco_drake.control.resampling import positions_at
+from loco_drake.control.state import HEIGHT, JOINTS
 from loco_drake.models.robots import Robot
 
 # toppra logs infeasible problems as errors; here they are results.
@@ -31,8 +31,6 @@ toppra.setup_logging("ERROR")
 # decelerates the whole robot, which cannot brake in the air, nor on the ground beyond
 # friction.
 _CLOCK_STOP_TIME = 0.5
-# Joints that are beyond their limits by less are left as they are, rad.
-_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -134,10 +132,37 @@ def retime(
     grid = np.linspace(start, end, count + 1)
     if start_rate > 1 - 1e-6 and _feasible(spline, grid, limits):
         steps = int(np.floor((commit - start) / PLAN_DT + 1e-6))
-        elapsed = PLAN_DT * np.arange(steps + 1, dtype=np.float64)
-        return Clock(start + elapsed, np.ones(steps + 1))
+        return _aligned(spline, start, steps, limits)
     rates = _solve(spline, grid, limits, start_rate)
     return _sample(grid, rates, commit)
+
+
+def _aligned(
+    spline: CubicSpline, start: float, steps: int, limits: PathLimits
+) -> Clock:
+    """Returns a clock at full speed that gets back to the plan's own samples.
+
+    What is played between samples is interpolated, so feet that stand slip. A clock
+    that was slowed waits for the next sample, if joints and base can.
+    """
+    elapsed = PLAN_DT * np.arange(steps + 1, dtype=np.float64)
+    full = Clock(start + elapsed, np.ones(steps + 1))
+    wait = float((start - spline.x[0]) % PLAN_DT)
+    if min(wait, PLAN_DT - wait) < 1e-6 * PLAN_DT or not steps:
+        return full
+    duration = steps * PLAN_DT
+    turn = 2 * np.pi * elapsed / duration
+    path_time = start + elapsed - wait * (turn - np.sin(turn)) / (2 * np.pi)
+    rate = 1 - wait / duration * (1 - np.cos(turn))
+    slowing = -2 * np.pi * wait / duration**2 * np.sin(turn)
+    lower, upper = limits.acceleration.T
+    acceleration = (
+        spline(path_time, 2) * rate[:, None] ** 2
+        + spline(path_time, 1) * slowing[:, None]
+    )
+    possible = (lower <= acceleration) & (acceleration <= upper)
+    gentle = np.abs(slowing) <= 1 / _CLOCK_STOP_TIME
+    return Clock(path_time, rate) if possible.all() and gentle.all() else full
 
 
 def _feasible(spline: CubicSpline, grid: Array, limits: PathLimits) -> bool:
@@ -266,16 +291,7 @@ def _follow(robot: Robot, raw: Plan, window: slice, clock: Clock, start: float) 
     """Returns ``raw`` played by ``clock``, from Context time ``start``."""
     s = clock.path_time
     times = raw.path_time[window]
-    waypoints = raw.q[window].copy()
-    waypoints[ORIENTATION] = quat_continuous(waypoints[ORIENTATION])
-    q = CubicSpline(times, waypoints)(s)
-    q[ORIENTATION] /= np.linalg.norm(q[ORIENTATION], axis=1, keepdims=True)
-    # Between samples a spline may exceed limits that the plan keeps.
-    q[JOINTS] = np.clip(
-        q[JOINTS],
-        np.minimum(robot.joint_lower, waypoints[JOINTS].min(axis=0)) - _ROUNDING,
-        np.maximum(robot.joint_upper, waypoints[JOINTS].max(axis=0)) + _ROUNDING,
-    )
+    q = positions_at(robot, times, raw.q[window], raw.p_WF[window], s)
     v = np.stack([np.interp(s, times, column) for column in raw.v[window].T], axis=1)
     nearest = window.start + np.clip(
         np.rint((s - times[0]) / PLAN_DT).astype(int), 0, len(times) - 1

@@ -5,10 +5,11 @@ import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from loco_drake.control.plan import PLAN_DT
+from loco_drake.control.plan import PLAN_DT, plan_from_motion
 from loco_drake.control.retiming import PathLimits, path_limits, smooth_plan
 from loco_drake.systems.control import PlanPlayer
 from loco_drake.systems.toppra_smoother import ToppraSmoother
+from tests.synthetic_motion import synthetic_motion
 
 
 def tight(robot, share):
@@ -72,6 +73,34 @@ def test_joints_stay_within_their_limits_between_samples(go2, trot):
     # As often at the limit as before.
     at_limit, before = ((a[:, 2::3] > limit - 1e-8).mean() for a in (joints, q[:, 7:]))
     assert at_limit > 0.3 * before
+
+
+def test_a_clock_that_was_slowed_returns_to_the_samples_of_the_plan(go2):
+    """One burst of the calves is slowed; what comes after it is the plan again."""
+    trot = plan_from_motion(go2, synthetic_motion("dog-trot", 8.0, 0.5))
+    q = trot.q.copy()
+    q[95:105, 9::3] += 0.3 * np.sin(np.pi * np.arange(10) / 5)[:, None]
+    burst = replace(trot, q=q)
+    limits = path_limits(go2)
+    quiet = np.abs(np.diff(trot.q[:, 9], n=2)).max() / PLAN_DT**2
+    acceleration = limits.acceleration.copy()
+    acceleration[:12] = np.array([-3.0, 3.0]) * quiet
+    smooth = smooth_plan(go2, burst, PathLimits(limits.speed, acceleration))
+    index = smooth.path_time / PLAN_DT
+    off = np.abs(index - np.rint(index))
+    slow = np.diff(index) < 1 - 1e-9
+    assert off[100:140].max() > 0.05  # it was slowed
+    assert np.flatnonzero(slow).max() < 260  # and has waited within two chunks
+    assert off[260:].max() < 1e-9
+    k = np.rint(index[260:]).astype(int)
+    np.testing.assert_allclose(smooth.q[260:], burst.q[k], atol=1e-9)
+    assert len(smooth) <= len(burst) + 20
+
+
+def test_no_foot_is_below_the_ground_between_samples(go2, trot):
+    smooth = smooth_plan(go2, trot, tight(go2, 0.08))
+    ground = min(go2.foot_radius, trot.p_WF[..., 2].min())
+    assert smooth.p_WF[..., 2].min() > ground - 1e-6
 
 
 def test_velocities_are_those_of_what_is_played(go2, trot):
