@@ -11,6 +11,7 @@ from loco_drake.control.command import CommandRange
 from loco_drake.evaluation.steering import rmse
 
 VELOCITY_GOAL, YAW_RATE_GOAL = 0.11, 0.12  # m/s, rad/s
+DISTANCE_GOAL = 0.5  # m, largest distance of the robot from its plan
 
 # At least so much of an axis is worth a point, m/s or rad/s.
 LEAST = 0.02

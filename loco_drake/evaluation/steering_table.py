@@ -5,7 +5,8 @@ A label's figures are those of :mod:`loco_drake.evaluation.steering`:
 * The *range* of a label is a box: an interval of forward and of sideways velocity and
   of yaw rate. It is searched for along each axis, outward from the gait's own pace and
   from 0, until the robot falls or the error of a point exceeds its goal; then all of it
-  shrinks until the whole grid keeps the goals without a fall.
+  shrinks until the whole grid keeps the goals, without a fall, and the robot drives for
+  60 s within .5 m of its plan.
 * The *grid* is five values of each axis within the range, one axis at a time with the
   others at the middle, and the eight corners; 6 s each, of which the last 4 s count.
 * *Steps* go from the middle of the range to both ends of the forward velocity and of
@@ -34,6 +35,7 @@ from loco_drake.evaluation.steering import (
     stride_velocity,
 )
 from loco_drake.evaluation.steering_courses import (
+    DISTANCE_GOAL,
     Course,
     Point,
     grid,
@@ -66,6 +68,7 @@ _SIDES = ((1, (0.1, 0.2, 0.3, 0.4)), (2, (0.25, 0.5, 0.75, 1.0, 1.25)))
 # Shares of forward velocity, and of sideways velocity and yaw rate, that are tried.
 _SHRINK = (
     (1.0, 1.0),
+    (1.0, 0.85),
     (1.0, 0.75),
     (0.9, 0.6),
     (0.8, 0.5),
@@ -133,7 +136,9 @@ class _Driver:
         widest = CommandRange(tuple(low.tolist()), tuple(high.tolist()))
         for along, across in _SHRINK:
             within = widest.scaled((along, across, across))
-            if self._keeps_goals(label, within, seed):
+            if self._keeps_goals(label, within, seed) and self._stays(
+                label, within, seed
+            ):
                 break
         return within
 
@@ -150,6 +155,12 @@ class _Driver:
                 return False
             errors.append(point.errors)
         return keeps_goals(errors)
+
+    def _stays(self, label: str, within: CommandRange, seed: int) -> bool:
+        """Returns whether a drive stays on its feet and near its plan."""
+        drive = self._drives(label, within, [seed])
+        near: bool = drive["distance_from_plan_max_m"] <= DISTANCE_GOAL
+        return near and drive["fall_rate"] == 0
 
     def _pace(self, label: str, seed: int) -> Array:
         """Returns the mean velocity of the gait's plan without a command, (3,)."""
