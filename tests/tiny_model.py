@@ -1,5 +1,7 @@
 """A motion model that is made in a moment."""
 
+from dataclasses import replace
+
 import torch
 
 from loco_drake.generation.features import JOINTS, SIZE
@@ -10,8 +12,13 @@ from loco_drake.generation.train_tokenizer import LearningTokenizer
 from loco_drake.models.robots import get_robot
 
 
-def make_tiny_model(robots: tuple[str, ...] = ("go2",)) -> MotionModel:
-    """Returns untrained networks that write wild but bounded motion of the first."""
+def make_tiny_model(
+    robots: tuple[str, ...] = ("go2",), *, told: bool = False
+) -> MotionModel:
+    """Returns untrained networks that write wild but bounded motion of the first.
+
+    With ``told``, the same ones that what they are told makes write something else.
+    """
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(3)
         config = TokenizerConfig(
@@ -45,4 +52,19 @@ def make_tiny_model(robots: tuple[str, ...] = ("go2",)) -> MotionModel:
                 heads=2,
             )
         )
+        if told:
+            generator = taught(generator)
     return MotionModel(tokenizer, generator.eval(), robots[0])
+
+
+def taught(plain: Generator) -> Generator:
+    """Returns a generator that velocities of up to 5 heights/s or rad/s change."""
+    generator = Generator(replace(plain.config, told=True))
+    generator.load_state_dict(plain.state_dict(), strict=False)
+    telling = generator.telling
+    assert telling is not None
+    telling.low.fill_(-5.0)
+    telling.high.fill_(5.0)
+    for adapter in telling.adapters:
+        torch.nn.init.normal_(adapter[-1].weight, std=2.0)
+    return generator.eval()

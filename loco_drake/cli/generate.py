@@ -34,6 +34,9 @@ class Generate:
     # Speed rank, from 0 (slowest recorded speed of the gait) to 1 (fastest). Default:
     # drawn for each seed.
     pace: float | None = None
+    # Velocity that the generator is told: forward, sideways m/s and yaw rate rad/s, in
+    # the heading frame; the nearest that was recorded of the gait is told.
+    tell: tuple[float, float, float] | None = None
     # Steer each motion by commands drawn every 2 s: along another path, sideways,
     # faster, slower and backwards, see docs/driving.md.
     steer: bool = False
@@ -57,6 +60,8 @@ class Generate:
         generate.check_duration(self.duration)
         schedule.check_ends_by(self.duration)
         generate.check_sampling(self.temperature, self.top_p, self.pace)
+        if self.tell is not None:
+            generate.check_velocity(self.tell)
         check_choice("robot", self.robot, ROBOTS)
         check_at_least("count", self.count, 1)
         check_at_least("seed", self.seed, 0)
@@ -77,6 +82,7 @@ class Generate:
                 temperature=self.temperature,
                 top_p=self.top_p,
                 speed_rank=self.pace,
+                velocity=self.tell,
             )
             seconds += time.perf_counter() - start
             for seed, motion in zip(seeds, motions, strict=True):

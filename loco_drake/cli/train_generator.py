@@ -2,15 +2,23 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from loco_drake.cli.training import Learned, NetworkTraining, Scores
 from loco_drake.common.errors import InputError, check_at_least
+
+if TYPE_CHECKING:
+    from loco_drake.generation.generator import GeneratorConfig
+    from loco_drake.generation.tokenizer import Tokenizer
+    from loco_drake.generation.training_motions import Library
 
 
 @dataclass(kw_only=True)
 class TrainGenerator(NetworkTraining):
     """Train the GPT that generates tokens for a gait and a duration.
+
+    With --tell, teaches a generator to be told the velocity of each token; without
+    being told it remains the same.
 
     Ctrl-C saves a checkpoint and stops; --resume continues.
     """
@@ -25,6 +33,8 @@ class TrainGenerator(NetworkTraining):
     # Number of codebooks to generate, the coarsest first. Finer codebooks encode detail
     # that is too irregular to predict.
     books: int = 8
+    # Weights of the generator to teach velocities, instead of training one.
+    tell: Path | None = None
     # Total optimizer steps.
     steps: int = 6000
     # Number of 20 s motions per gait to assemble from the training clips.
@@ -40,33 +50,26 @@ class TrainGenerator(NetworkTraining):
         super().check()
 
     def learn(self) -> Learned:
-        """Trains a generator for the labels of the motions."""
-        from loco_drake.generation.generator import GeneratorConfig
+        """Trains a generator for the labels of the motions, or teaches one."""
         from loco_drake.generation.tokenizer import load_tokenizer
         from loco_drake.generation.train_generator import (
             score_generator,
             train_generator,
         )
+        from loco_drake.generation.train_telling import train_telling
         from loco_drake.generation.training_motions import load_library
 
         library = load_library(*self.motions)
         tokenizer = load_tokenizer(self.tokenizer)
-        most = tokenizer.config.codebooks
-        if not 1 <= self.books <= most:
-            raise InputError(
-                f"--books must be from 1 to {most}, as many as the tokenizer has, not "
-                f"{self.books}."
+        if self.tell is not None:
+            generator, result = train_telling(
+                library, tokenizer, self.tell, self, self.stitched
             )
-        config = GeneratorConfig(
-            tokenizer=tokenizer.fingerprint,
-            codebooks=self.books,
-            codebook_size=tokenizer.config.codebook_size,
-            frames_per_token=tokenizer.config.frames_per_token,
-            labels=tuple(str(label) for label in library.labels),
-        )
-        generator, result = train_generator(
-            library, tokenizer, config, self, self.stitched
-        )
+        else:
+            config = self._config(library, tokenizer)
+            generator, result = train_generator(
+                library, tokenizer, config, self, self.stitched
+            )
 
         def score() -> Scores:
             figures = {"steps": result.steps, "wall_clock_s": result.seconds}
@@ -74,7 +77,28 @@ class TrainGenerator(NetworkTraining):
                 if clips := getattr(library, name):
                     nats = score_generator(generator, tokenizer, clips)
                     figures[f"{name}_nats_per_code"] = nats
+                    if self.tell is not None:
+                        nats = score_generator(generator, tokenizer, clips, told=True)
+                        figures[f"{name}_nats_per_code_told"] = nats
             rows = [(k.replace("_", " "), f"{v:.4g}") for k, v in figures.items()]
             return Scores(figures, ("figure", "value"), rows)
 
         return result, score
+
+    def _config(self, library: "Library", tokenizer: "Tokenizer") -> "GeneratorConfig":
+        """Returns the sizes of a generator to train."""
+        from loco_drake.generation.generator import GeneratorConfig
+
+        most = tokenizer.config.codebooks
+        if not 1 <= self.books <= most:
+            raise InputError(
+                f"--books must be from 1 to {most}, as many as the tokenizer has, not "
+                f"{self.books}."
+            )
+        return GeneratorConfig(
+            tokenizer=tokenizer.fingerprint,
+            codebooks=self.books,
+            codebook_size=tokenizer.config.codebook_size,
+            frames_per_token=tokenizer.config.frames_per_token,
+            labels=tuple(str(label) for label in library.labels),
+        )

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 # Options that are not the run's: where it is, and what a call does.
 _OF_THE_CALL = ("out", "resume", "json", "start_from")
 # Where it learned from may be elsewhere now: what is there is compared.
-_FOLDERS = ("motions", "references", "tokenizer")
+_FOLDERS = ("motions", "references", "tokenizer", "tell")
 
 
 class Scores(NamedTuple):

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, check_bounds
 from loco_drake.generation.motion_model import MotionModel
 from loco_drake.motion.gaits import ROW_LABELS, GaitLabel, GaitSchedule
@@ -26,6 +27,7 @@ def generate_motions(
     temperature: float = 1.0,
     top_p: float = 0.95,
     speed_rank: float | None = None,
+    velocity: ArrayLike | None = None,
 ) -> list[Motion]:
     """Generates one motion for each seed, in one batch.
 
@@ -38,12 +40,15 @@ def generate_motions(
         temperature: see :meth:`.Generator.sample`.
         top_p: see there.
         speed_rank: see :meth:`.MotionModel.start`.
+        velocity: what all motions are told, see :meth:`.MotionModel.extend`, shape
+            (3,), or what the tokens of each are, (B, n, 3); the last one holds.
 
     Raises:
         InputError: if an argument is not as said.
     """
     check_duration(duration)
     check_sampling(temperature, top_p, speed_rank)
+    told = _told(model, velocity, len(seeds))
     schedule = GaitSchedule((gait,)) if isinstance(gait, GaitLabel) else gait
     schedule.check_ends_by(duration)
     if any(seed < 0 for seed in seeds):
@@ -56,8 +61,16 @@ def generate_motions(
         labels = np.tile(
             token_labels(model, schedule, chunk * model.chunk_tokens), (len(seeds), 1)
         )
+        tokens = chunk * model.chunk_tokens + np.arange(model.chunk_tokens)
+        velocities = (
+            None if told is None else told[:, tokens.clip(0, told.shape[1] - 1)]
+        )
         stream, frames = model.extend(
-            stream, labels, temperature=temperature, top_p=top_p
+            stream,
+            labels,
+            velocity=velocities,
+            temperature=temperature,
+            top_p=top_p,
         )
         parts.append(frames)
     q, v, contacts, rows = (
@@ -86,6 +99,7 @@ def generate_motions(
                 "temperature": f"{temperature:g}",
                 "top_p": f"{top_p:g}",
                 "pace": f"{stream.speed_rank[i]:.4g}",
+                **({} if told is None else {"told": _text(told[i])}),
                 "tokenizer": model.tokenizer.fingerprint,
             },
             gait_changes=gait_changes if label == SEVERAL else (),
@@ -125,6 +139,33 @@ def check_duration(duration: float) -> None:
         raise InputError(
             f"The duration must be {2 / FPS:g} s or more, not {duration:g}."
         )
+
+
+def check_velocity(velocity: ArrayLike) -> None:
+    """Raises InputError unless velocities to tell (..., 3) are finite."""
+    values = np.asarray(velocity, dtype=np.float64)
+    if not np.isfinite(values).all():
+        raise InputError(
+            "A velocity to tell must be three finite numbers: forward and sideways m/s "
+            f"and yaw rate rad/s; not {', '.join(f'{v:g}' for v in values.flat)}."
+        )
+
+
+def _told(model: MotionModel, velocity: ArrayLike | None, batch: int) -> Array | None:
+    """Returns what the tokens of each motion are told, (B, n, 3)."""
+    if velocity is None:
+        return None
+    told = np.asarray(velocity, dtype=np.float64)
+    check_velocity(told)
+    model.check_told()
+    return np.tile(told, (batch, 1, 1)) if told.ndim == 1 else told
+
+
+def _text(told: Array) -> str:
+    """Returns what a motion was told (n, 3) as text."""
+    if len(told) > 1:
+        return f"{len(told)} tokens"
+    return ", ".join(f"{value:g}" for value in told[0])
 
 
 def check_sampling(temperature: float, top_p: float, speed_rank: float | None) -> None:

@@ -1,5 +1,7 @@
 """The generator: a GPT over motion tokens for a gait, a speed and a duration.
 
+It can be taught to be told the velocity of each token too, see :mod:`.telling`.
+
 The transformer takes one step per token. Small heads sample the codes of a token's
 codebooks in order, each given the transformer's output and the codes sampled so far, as
 residual codebooks refine one another.
@@ -19,6 +21,7 @@ from torch.nn import functional
 
 from loco_drake.common.weights import load_network
 from loco_drake.generation import speed_rank
+from loco_drake.generation.telling import Telling
 from loco_drake.motion.gaits import LABELS, ONE_HOT, ONE_HOT_SIZE
 
 # Durations are binned on a log scale; the last bin is "long" and never ends.
@@ -42,6 +45,7 @@ class GeneratorConfig:
     layers: int = 3  # transformer blocks
     heads: int = 4  # attention heads
     dropout: float = 0.1  # probability, while training
+    told: bool = False  # whether it can be told velocities
 
 
 # Keys and values of a layer for the P times so far, each (B, heads, P, size).
@@ -156,6 +160,9 @@ class Generator(nn.Module):
             for _ in range(codebooks)
         )
         self.apply(_initialize)
+        self.telling: Telling | None = None
+        if config.told:
+            self.telling = Telling(width, config.layers, config.dropout)
 
     def trunk(
         self,
@@ -164,6 +171,7 @@ class Generator(nn.Module):
         speed_bins: Tensor,
         duration: Tensor,
         cache: Cache | None = None,
+        velocities: Tensor | None = None,
     ) -> tuple[Tensor, Cache]:
         """Returns the input of the heads, shape (B, T, width), and a cache.
 
@@ -173,16 +181,32 @@ class Generator(nn.Module):
             speed_bins: see :mod:`.speed_rank`, shape (B, T) or (B, 1).
             duration: bin of the sequence's duration, shape (B,).
             cache: that of the steps before, then T must be 1.
+            velocities: told of each step's token, NaN where nothing is, see
+                :mod:`.telling`; shape (B, T, 3). They replace the speed.
+
+        Raises:
+            ValueError: if it was not taught to be told velocities.
         """
         offset = torch.arange(self.config.codebooks) * (self.config.codebook_size + 1)
         x = self.codes_in(before + offset).sum(dim=-2)  # (B, T, width)
+        if velocities is not None:
+            if self.telling is None:
+                raise ValueError("the generator was not taught velocities")
+            velocities = self.telling.bounded(velocities, labels)
+            embedded, told = self.telling.embed(velocities)
+            own = (velocities[..., :1] > self.speed_edges[labels]).sum(dim=-1)
+            speed_bins = torch.where(told[..., 0], own, speed_bins)
         x = x + self.gait_in(self.one_hot[labels]) + self.pace_in(speed_bins)
         x = x + self.duration_in(duration)[:, None]
         x = self.dropout(x)
         present: Cache = []
         for i, block in enumerate(self.blocks):
+            if velocities is not None and self.telling is not None:
+                x = self.telling.adapt(i, x, embedded, told)
             x, kv = block(x, None if cache is None else cache[i])
             present.append(kv)
+        if velocities is not None and self.telling is not None:
+            x = self.telling.adapt(len(self.blocks), x, embedded, told)
         return self.norm(x), present
 
     def heads(
@@ -212,13 +236,16 @@ class Generator(nn.Module):
         speed_bins: Tensor,
         duration: Tensor,
         codes: Tensor,
+        velocities: Tensor | None = None,
     ) -> Tensor:
         """Returns logits (B, T, codebooks, codebook_size) of the tokens ``codes``.
 
         Logits of a codebook depend on ``before`` up to their step and, within the step,
         on ``codes`` of earlier codebooks. For the arguments see :meth:`trunk`.
         """
-        hidden, _ = self.trunk(before, labels, speed_bins, duration)
+        hidden, _ = self.trunk(
+            before, labels, speed_bins, duration, velocities=velocities
+        )
         logits, _ = self.heads(hidden, lambda codebook, _: codes[..., codebook])
         return logits
 
@@ -232,6 +259,7 @@ class Generator(nn.Module):
         uniforms: Tensor,
         temperature: float,
         top_p: float,
+        velocities: Tensor | None = None,
     ) -> Tensor:
         """Samples the codes (B, n, codebooks) of n tokens that continue ``history``.
 
@@ -245,6 +273,7 @@ class Generator(nn.Module):
             uniforms: random numbers in [0, 1), shape (B, n, codebooks).
             temperature: divides the logits; 0 is greedy.
             top_p: sample from the likeliest codes that together reach it.
+            velocities: of the tokens that ``labels`` are of, see :meth:`trunk`.
         """
         batch, steps, codebooks = uniforms.shape
         if history.shape[1] == 0:
@@ -257,8 +286,15 @@ class Generator(nn.Module):
             return draw(logits, dice, temperature, top_p)
 
         while len(tokens) < steps:
-            told = labels[:, seen : seen + before.shape[1]]
-            hidden, cache = self.trunk(before, told, speed_bins, duration, cache)
+            now = slice(seen, seen + before.shape[1])
+            hidden, cache = self.trunk(
+                before,
+                labels[:, now],
+                speed_bins,
+                duration,
+                cache,
+                None if velocities is None else velocities[:, now],
+            )
             seen += before.shape[1]
             _, codes = self.heads(hidden[:, -1], choose)
             before = codes[:, None]  # (B, 1, codebooks)

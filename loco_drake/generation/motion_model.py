@@ -17,6 +17,7 @@ from loco_drake.common.rotations import quat_error, rotate_plane
 from loco_drake.generation.footing import Footing, start_footing, step_footing
 from loco_drake.generation.generator import Generator, duration_bin, load_generator
 from loco_drake.generation.speed_rank import drawn_rank, rank_bin
+from loco_drake.generation.telling import is_told
 from loco_drake.generation.tokenizer import Tokenizer, load_tokenizer
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.models.shipped import pretrained_path
@@ -43,6 +44,7 @@ class Stream(Immutable):
     chunk: int  # number of chunks so far
     tokens: Integers  # the latest ones, (B, n, codebooks)
     labels: Integers  # of the tokens, index into gaits.LABELS, (B, n)
+    told: Array  # velocities of the tokens, see telling.py; NaN: not told, (B, n, 3)
     footing: Footing  # after the frame held back
     q: Array  # last frame returned and the one held back, (B, 2, 19); or (B, 0, 19)
     contacts: NDArray[np.bool_]  # of the frame held back, (B, 4)
@@ -133,6 +135,7 @@ class MotionModel:
             chunk=0,
             tokens=np.zeros((batch, 0, self.generator.config.codebooks), np.int64),
             labels=np.zeros((batch, 0), dtype=np.int64),
+            told=np.zeros((batch, 0, 3)),
             footing=start_footing(pose),
             q=np.zeros((batch, 0, 19)),
             contacts=np.zeros((batch, 4), dtype=np.bool_),
@@ -143,6 +146,7 @@ class MotionModel:
         stream: Stream,
         labels: Integers,
         *,
+        velocity: Array | None = None,
         temperature: float = 1.0,
         top_p: float = 0.95,
     ) -> tuple[Stream, Frames]:
@@ -155,23 +159,31 @@ class MotionModel:
             stream: the stream, which is not modified.
             labels: index into gaits.LABELS of each motion (B,), or of each of its
                 new tokens (B, chunk_tokens).
+            velocity: forward and sideways in m/s and yaw rate in rad/s, in the heading
+                frame, that each motion (B, 3), or each of its new tokens (B,
+                chunk_tokens, 3), is told; the nearest that was recorded of its gait is
+                told. NaN tells nothing, as does None.
             temperature: see :meth:`Generator.sample`.
             top_p: see :meth:`Generator.sample`.
 
         Raises:
-            InputError: if the weights were not trained on a label.
+            InputError: if the weights were not trained on a label, or a velocity is to
+                be told to weights that were not taught it.
         """
         batch = len(stream.seeds)
         labels = np.asarray(labels, dtype=np.int64)
         self.check_labels(labels)
+        told = self._in_stand_heights(velocity, batch)
         new = np.broadcast_to(labels.reshape(batch, -1), (batch, self.chunk_tokens))
         # The first tokens only provide context for the decoder.
         lead = 0 if stream.chunk else self.lead
         new = np.concatenate((np.repeat(new[:, :1], lead, axis=1), new), axis=1)
+        told = np.concatenate((np.repeat(told[:, :1], lead, axis=1), told), axis=1)
         shape = (new.shape[1], self.generator.config.codebooks)
         dice = [uniforms(int(seed), stream.chunk, shape) for seed in stream.seeds]
         window = self.generator.config.window
         history, given = stream.tokens[:, -window:], stream.labels[:, -window:]
+        velocities = np.concatenate((stream.told[:, -window:][:, 1:], told), axis=1)
         with single_thread():
             drawn = self._writer.sample(
                 torch.from_numpy(history.copy()),
@@ -181,15 +193,17 @@ class MotionModel:
                 torch.from_numpy(np.stack(dice)),
                 temperature,
                 top_p,
+                torch.from_numpy(velocities) if is_told(velocities) else None,
             )
-        return self.append(stream, drawn.numpy(), new)
+        return self.append(stream, drawn.numpy(), new, told)
 
     def append(
-        self, stream: Stream, tokens: Integers, labels: Integers
+        self, stream: Stream, tokens: Integers, labels: Integers, told: Array
     ) -> tuple[Stream, Frames]:
         """Decodes tokens (B, n, codebooks), of labels (B, n), that continue ``stream``.
 
-        For an empty stream, the frames of the first ``lead`` tokens are not returned.
+        ``told`` are the velocities that they were told, (B, n, 3), as in a stream. For
+        an empty stream, the frames of the first ``lead`` tokens are not returned.
         """
         before = stream.tokens.shape[1]
         window = np.concatenate((stream.tokens, tokens), axis=1)
@@ -223,6 +237,7 @@ class MotionModel:
             chunk=stream.chunk + 1,
             tokens=window[:, -keep:].copy(),
             labels=window_labels[:, -keep:].copy(),
+            told=np.concatenate((stream.told, told), axis=1)[:, -keep:].copy(),
             footing=footing,
             q=q[:, -2:].copy(),
             contacts=contacts[:, -1].copy(),
@@ -252,6 +267,24 @@ class MotionModel:
         start = np.concatenate((xy, turn[:, None]), axis=-1)
         after, q, contacts = step_footing(self.robot, start_footing(start), features)
         return after, q[:, -2:], contacts[:, -1:]
+
+    def _in_stand_heights(self, velocity: Array | None, batch: int) -> Array:
+        """Returns the velocities of a chunk's tokens as telling.py has them."""
+        shape = (batch, self.chunk_tokens, 3)
+        if velocity is None or not is_told(velocity):
+            return np.full(shape, np.nan)
+        self.check_told()
+        velocity = np.asarray(velocity, dtype=np.float64).reshape(batch, -1, 3)
+        height = self.robot.stand_height
+        return np.broadcast_to(velocity / [height, height, 1.0], shape)
+
+    def check_told(self) -> None:
+        """Raises InputError if the weights were not taught to be told velocities."""
+        if not self.generator.config.told:
+            raise InputError(
+                "The generator was not taught velocities; `loco-drake train generator "
+                "--tell` teaches it."
+            )
 
     def check_labels(self, labels: Integers) -> None:
         """Raises InputError if the weights were not trained on one of ``labels``."""

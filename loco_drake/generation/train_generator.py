@@ -23,6 +23,7 @@ from loco_drake.generation.generator import (
 )
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.stitching import Stitcher
+from loco_drake.generation.telling import AXES, token_velocities
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.tokenizer_score import encode_clip
 from loco_drake.generation.training import LoopResult, train
@@ -40,8 +41,8 @@ STITCHED_SECONDS = 20.0  # each
 CORRUPTION = 0.1  # share of input codes replaced, so that the model learns to recover
 
 
-# What Generator.forward takes: before, labels, speed_bins, duration and codes.
-Batch = tuple[Tensor, Tensor, Tensor, Tensor, Tensor]
+# What Generator.forward takes: before, labels, speed_bins, duration, codes, velocities.
+Batch = tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Tensor | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +52,7 @@ class Codes:
     label: int  # index into gaits.LABELS
     codes: NDArray[np.int64]  # (n, codebooks)
     speeds: NDArray[np.float64]  # see speed_rank.token_speeds, (n,)
+    velocities: NDArray[np.float64]  # see telling.token_velocities, (n, 3)
 
 
 def encode_clips(
@@ -60,10 +62,11 @@ def encode_clips(
     encoded = []
     for clip in clips:
         codes = encode_clip(tokenizer, clip)[:, :codebooks].numpy()
-        speeds = speed_rank.token_speeds(
-            clip.features, tokenizer.config.frames_per_token
+        speeds, velocities = (
+            of(clip.features, tokenizer.config.frames_per_token)
+            for of in (speed_rank.token_speeds, token_velocities)
         )
-        encoded.append(Codes(clip.label.index, codes, speeds))
+        encoded.append(Codes(clip.label.index, codes, speeds, velocities))
     return encoded
 
 
@@ -122,7 +125,8 @@ def train_generator(
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         chosen = [encoded[i] for i in random.integers(len(encoded), size=BATCH)]
-        return generator_loss(generator, make_batch(config, edges, chosen, random)), {}
+        batch = make_batch(config, edges, chosen, random)
+        return generator_loss(generator, (*batch[:5], None)), {}
 
     run = {
         "network": asdict(config),
@@ -154,10 +158,12 @@ def make_batch(
     batch = len(chosen)
     windows = np.empty((batch, length + 1, config.codebooks), dtype=np.int64)
     speed_bins = np.empty((batch, length), dtype=np.int64)
+    velocities = np.empty((batch, length, AXES), dtype=np.float32)
     for i, sequence in enumerate(chosen):
         # The token before the window is all that the first step is told.
         start = random.integers(len(sequence.codes) - length)
         windows[i] = sequence.codes[start : start + length + 1]
+        velocities[i] = sequence.velocities[start + 1 : start + length + 1]
         speeds = sequence.speeds[start + 1 : start + length + 1]
         speed_bins[i] = np.searchsorted(edges[sequence.label], speeds)
     windows[random.random(batch) < NO_HISTORY, 0] = config.codebook_size
@@ -174,19 +180,27 @@ def make_batch(
         torch.from_numpy(speed_bins),
         torch.from_numpy(duration_bin(seconds)),
         torch.from_numpy(codes),
+        torch.from_numpy(velocities),
     )
 
 
 def generator_loss(generator: Generator, batch: Batch) -> Tensor:
     """Returns the mean cross-entropy in nats a code."""
-    logits, codes = generator(*batch), batch[-1]
+    logits, codes = generator(*batch), batch[4]
     return functional.cross_entropy(logits.flatten(0, 2), codes.flatten())
 
 
 def score_generator(
-    generator: Generator, tokenizer: Tokenizer, clips: Sequence[Clip]
+    generator: Generator,
+    tokenizer: Tokenizer,
+    clips: Sequence[Clip],
+    *,
+    told: bool = False,
 ) -> float:
-    """Returns the cross-entropy of whole clips in nats a code."""
+    """Returns the cross-entropy of whole clips in nats a code.
+
+    ``told`` is whether the generator is told the velocity of each token.
+    """
     total, count = 0.0, 0
     config = generator.config
     first = torch.full((1, 1, config.codebooks), config.codebook_size)
@@ -197,7 +211,15 @@ def score_generator(
         before = torch.cat((first, codes[:, :-1]), dim=1)
         labels = torch.full(codes.shape[:2], sequence.label)
         bins = np.searchsorted(edges[sequence.label], sequence.speeds)
-        batch = (before, labels, torch.from_numpy(bins)[None], duration, codes)
+        velocities = torch.from_numpy(sequence.velocities).float()[None]
+        batch = (
+            before,
+            labels,
+            torch.from_numpy(bins)[None],
+            duration,
+            codes,
+            velocities if told else None,
+        )
         with torch.inference_mode(), single_thread():
             loss = generator_loss(generator, batch)
         total, count = total + float(loss) * codes.numel(), count + codes.numel()

@@ -59,9 +59,9 @@ def _record(monkeypatch):
     recorded.clear()
     plain = MotionModel.append
 
-    def append(self, stream, tokens, labels):
+    def append(self, stream, tokens, labels, told):
         recorded.append(tokens)
-        return plain(self, stream, tokens, labels)
+        return plain(self, stream, tokens, labels, told)
 
     monkeypatch.setattr(MotionModel, "append", append)
 
@@ -73,7 +73,8 @@ def test_chunks_are_the_whole_decoded_at_once(model):
     # A stream keeps only the last of them.
     assert streams[-1].tokens.shape[1] < tokens.shape[1]
     labels = np.full(tokens.shape[:2], TROT.index)
-    _, at_once = model.append(streams[0], tokens, labels)
+    told = np.full((*tokens.shape[:2], 3), np.nan)
+    _, at_once = model.append(streams[0], tokens, labels, told)
     for name, tolerance in (("q", 1e-5), ("v", 1e-3)):
         np.testing.assert_allclose(
             joined(parts, name), getattr(at_once, name), atol=tolerance

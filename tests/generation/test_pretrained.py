@@ -1,16 +1,21 @@
+import hashlib
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from safetensors import safe_open
 
 from loco_drake.cli.generate import Generate
 from loco_drake.common.errors import InputError
+from loco_drake.common.rotations import yaw_of
 from loco_drake.evaluation.gait_change import forward_speed, roughness
 from loco_drake.generation.generate import generate_motions
-from loco_drake.generation.motion_model import pretrained_motion_model
+from loco_drake.generation.generator import Generator
+from loco_drake.generation.motion_model import MotionModel, pretrained_motion_model
 from loco_drake.models.robots import ROBOTS, get_robot
 from loco_drake.models.shipped import pretrained_path
 from loco_drake.motion.gaits import parse_label, parse_schedule
@@ -98,6 +103,64 @@ def test_a_faster_pace_is_faster_and_is_kept(label):
     assert speeds[0] < edges[6]
     assert edges[4] < speeds[1] < edges[10]
     assert edges[8] < speeds[2]
+
+
+# Of the generator's tensors without those that learned to be told velocities, as in
+# version 0.1.0: what it writes without being told was evaluated and has not changed.
+UNTOLD = "9b3a465e9fbd6c2d2d35a75a9d9523e4793972d851bfbf18957bcc66b3e9cfa8"
+
+
+def test_learning_to_be_told_changed_nothing_else():
+    digest = hashlib.sha256()
+    with safe_open(pretrained_path("generator"), "np") as file:
+        names = [n for n in sorted(file.keys()) if not n.startswith("telling.")]
+        for name in names:
+            value = file.get_tensor(name)
+            text = f"{name} {value.dtype} {value.shape}"
+            digest.update(text.encode() + value.tobytes())
+    assert len(names) == 86
+    assert digest.hexdigest() == UNTOLD
+
+
+def test_without_being_told_it_writes_as_a_network_that_cannot_be():
+    """To the last bit."""
+    model = pretrained_motion_model("go2")
+    plain = Generator(replace(model.generator.config, told=False))
+    plain.load_state_dict(model.generator.state_dict(), strict=False)
+    untold = MotionModel(model.tokenizer, plain, "go2")
+    for label in ("dog-pace", "mpc-bound"):
+        a, b = (
+            generate_motions(m, parse_label(label), 2.0, [3])[0]
+            for m in (model, untold)
+        )
+        np.testing.assert_array_equal(a.joint_positions, b.joint_positions)
+        np.testing.assert_array_equal(a.base_position, b.base_position)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_pace_turns_as_it_is_told(name):
+    """By .7 rad/s to each side, within a third; untold it goes straight on average."""
+    model = pretrained_motion_model(name)
+    for turn in (-0.7, 0.7):
+        motions = generate_motions(
+            model, parse_label("dog-pace"), 6.0, range(4), velocity=[0.6, 0.0, turn]
+        )
+        yaws = [np.unwrap(yaw_of(m.base_quaternion))[100:] for m in motions]
+        rates = [(yaw[-1] - yaw[0]) / (len(yaw) - 1) * 50 for yaw in yaws]
+        assert np.mean(rates) == pytest.approx(turn, rel=0.33)
+
+
+@pytest.mark.parametrize(
+    ("label", "speeds"), [("mpc-trot", (1.2, 1.7)), ("solo8-trot", (0.4, 1.0))]
+)
+def test_gaits_go_as_fast_as_they_are_told(label, speeds):
+    model = pretrained_motion_model("go2")
+    for speed in speeds:
+        motions = generate_motions(
+            model, parse_label(label), 6.0, range(4), velocity=[speed, 0.0, 0.0]
+        )
+        found = [forward_speed(model.robot, m)[100:].mean() for m in motions]
+        assert np.mean(found) == pytest.approx(speed, abs=0.1)
 
 
 # Greatest acceleration about a change, over that of the gaits themselves: to brake from
@@ -267,6 +330,7 @@ def test_the_command_changes_the_gait_on_the_way(tmp_path):
         ({"count": 0}, "--count"),
         ({"seed": -1}, "--seed"),
         ({"temperature": float("nan")}, "temperature"),
+        ({"tell": (0.5, float("inf"), 0.0)}, "three finite numbers"),
         ({"top_p": 1.5}, "top_p"),
     ],
 )

@@ -173,7 +173,7 @@ def test_windows_are_shifted_by_one_token(library, tokenizer):
     encoded = encode_clips(tokenizer, stitched_clips(library.train, 16, 0), codebooks=2)
     random = np.random.default_rng(0)
     edges = speed_edges((e.label, e.speeds) for e in encoded)
-    before, labels, speed_bins, duration, codes = make_batch(
+    before, labels, speed_bins, duration, codes, velocities = make_batch(
         config, edges, encoded, random
     )
     agree = (before[:, 1:] == codes[:, :-1]).float().mean()
@@ -183,6 +183,7 @@ def test_windows_are_shifted_by_one_token(library, tokenizer):
     for row, sequence in zip(labels, encoded, strict=True):
         assert set(row.tolist()) == {sequence.label}
     assert speed_bins.shape == labels.shape
+    assert velocities.shape == (*labels.shape, 3)
     assert 0 <= speed_bins.min() < speed_bins.max() < BINS
     # No window is told a duration that is shorter than itself.
     assert duration.min() >= duration_bin(20 * 4 / 50)
