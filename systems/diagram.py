@@ -224,6 +224,9 @@ def AddPlan(
         _Add(builder, "steering", steering, plan=chain[-1].GetOutputPort("plan"))
         inputs["command"] = steering.GetInputPort("command")
         outputs["followed"] = steering.GetOutputPort("followed")
+        if scenario.steering.tell and reference.HasInputPort("command"):
+            told = steering.GetOutputPort("told")
+            builder.Connect(told, reference.GetInputPort("command"))
         chain.append(steering)
     if scenario.smoother is not None:
         smoother = ToppraSmoother(robot, scenario.smoother)

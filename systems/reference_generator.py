@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.common.immutable import Immutable
+from loco_drake.control.command import check_finite
 from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD, Plan, join_plans, make_plan
 from loco_drake.generation.generate import token_labels
 from loco_drake.generation.motion_model import (
@@ -21,6 +23,9 @@ from loco_drake.motion.gaits import LABELS, GaitLabel, GaitSchedule, parse_sched
 from .plan_producer import PlanProducer
 from .scenario import GeneratedReference
 
+# A command that differs less from what is told, in m/s and rad/s, is not told: to write
+# ahead again takes longer than an update, and a driver's keys change it all the time.
+LEAST_CHANGE = 0.05
 _KEEP = 1.0  # seconds of plan kept behind what can no longer change
 
 
@@ -33,6 +38,7 @@ class _Chunk(Immutable):
     lead: int  # tokens at its beginning that only gave context
     tokens: NDArray[np.int64]  # shape (1, n, codebooks)
     labels: NDArray[np.int64]  # of the tokens, shape (1, n)
+    told: NDArray[np.float64]  # velocities of the tokens, see Stream, shape (1, n, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +49,7 @@ class _Script(Immutable):
     stream: Stream
     plan: Plan | None = None
     chunks: tuple[_Chunk, ...] = ()
+    told: tuple[float, ...] | None = None  # the velocity that new tokens are told
 
     @property
     def frames(self) -> int:
@@ -62,6 +69,8 @@ class ReferenceGenerator(PlanProducer):
         - gait: vector (1,), index into LABELS; optional
         - path_time: vector (1,), how much of the plan has been used; s; optional
         - fixed_time: vector (1,), plan time up to which nothing changes; s; optional
+        - command: vector (3,), velocity to be told: forward, sideways, yaw rate in H;
+          m/s, rad/s; NaN for none; optional
         output_ports:
         - plan: abstract, Plan; open-ended
 
@@ -69,8 +78,10 @@ class ReferenceGenerator(PlanProducer):
     time and ``path_time`` are used. The configured gait may be a schedule, whose times
     are on the plan's clock and are kept to one token. The port ``gait`` overrides the
     schedule: what comes later than ``fixed_time`` by an update and up to a token is
-    generated again. The output depends only on the seed, the chunks' numbers and the
-    labels: a cloned or reset Context repeats it exactly.
+    generated again, and so it is if ``command`` differs by more than ``LEAST_CHANGE``
+    from what was told last. H is the base's heading frame. The output depends only on
+    the seed, the chunks' numbers, the labels and what was told: a cloned or reset
+    Context repeats it exactly.
 
     Args:
         config: gait, seed and sampling.
@@ -98,6 +109,7 @@ class ReferenceGenerator(PlanProducer):
         self._gait = self.DeclareVectorInputPort("gait", 1)
         self._path_time = self.DeclareVectorInputPort("path_time", 1)
         self._fixed_time = self.DeclareVectorInputPort("fixed_time", 1)
+        self._command = self.DeclareVectorInputPort("command", 3)
         self._DeclarePlan(self._begun(self._config.gait, self._config.seed))
 
     def SetReference(
@@ -141,7 +153,24 @@ class ReferenceGenerator(PlanProducer):
                 script = self._rewound(script, fixed + UPDATE_PERIOD + PLAN_DT)
                 script = replace(script, schedule=schedule)
                 used = min(used, fixed)
+        if self._command.HasValue(context):
+            told = self._to_tell(script, self._command.Eval(context))
+            if told != script.told:
+                script = self._rewound(script, fixed + UPDATE_PERIOD + PLAN_DT)
+                script = replace(script, told=told)
+                used = min(used, fixed)
         return self._written(script, used, fixed)
+
+    def _to_tell(self, script: _Script, command: Array) -> tuple[float, ...] | None:
+        """Returns the velocity to be told, which small changes leave as it was."""
+        if np.isnan(command).all():
+            return None
+        check_finite(command)
+        told = script.told
+        if told is not None and np.abs(command - told).max() <= LEAST_CHANGE:
+            return told
+        self._model.check_told()
+        return tuple(command.tolist())
 
     def _label(self, index: float) -> GaitLabel:
         """Returns the gait that the input port selects."""
@@ -165,7 +194,10 @@ class ReferenceGenerator(PlanProducer):
         last = chunks.pop()
         tokens = last.lead + token - last.frames // per_token
         stream, _ = self._model.append(
-            last.before, last.tokens[:, :tokens], last.labels[:, :tokens]
+            last.before,
+            last.tokens[:, :tokens],
+            last.labels[:, :tokens],
+            last.told[:, :tokens],
         )
         cut = replace(last, tokens=last.tokens[:, :tokens])
         end = token * per_token - round(script.plan.start_time / PLAN_DT)
@@ -200,6 +232,7 @@ class ReferenceGenerator(PlanProducer):
         stream, frames = self._model.extend(
             before,
             labels[None],
+            velocity=None if script.told is None else np.array([script.told]),
             temperature=self._config.temperature,
             top_p=self._config.top_p,
         )
@@ -214,7 +247,12 @@ class ReferenceGenerator(PlanProducer):
         lead = 0 if before.chunk else self._model.lead
         tokens = len(labels) + lead
         chunk = _Chunk(
-            before, count, lead, stream.tokens[:, -tokens:], stream.labels[:, -tokens:]
+            before,
+            count,
+            lead,
+            tokens=stream.tokens[:, -tokens:],
+            labels=stream.labels[:, -tokens:],
+            told=stream.told[:, -tokens:],
         )
         return replace(
             script,

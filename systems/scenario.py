@@ -84,6 +84,10 @@ class SteeringConfig:
     # Keep commands within the ranges measured for the robot's main policy; otherwise
     # only within what legs and joints can do.
     measured_ranges: bool = True
+    # Bend the plan until it follows the command.
+    bend: bool = True
+    # Tell the generator the command, if the reference is generated.
+    tell: bool = False
 
     def check(self) -> None:
         """Raises InputError unless every field is valid."""

@@ -1,14 +1,15 @@
 """The system that makes a plan go where it is told."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import nan
 from typing import Any
 
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context
 
 from loco_drake.common.immutable import Immutable
-from loco_drake.control.command import CommandRange
+from loco_drake.control.command import CommandRange, check_finite
 from loco_drake.control.plan import Plan, first_change, standing_plan
 from loco_drake.control.steering import Steered, begin, steer
 from loco_drake.models.robots import Robot
@@ -66,12 +67,14 @@ class Steering(PlanProducer):
         output_ports:
         - plan: abstract, Plan; on the clock of the input
         - followed: vector (3,), the command as far as it is followed; m/s, rad/s
+        - told: vector (3,), the command as it was sampled, NaN without one; m/s, rad/s
 
     H is the base's heading frame. A critically damped filter turns the command into the
     velocity of the plan, see :mod:`loco_drake.control.steering`. Commands are kept in
     the range of each gait; of one that legs or joints cannot follow, the largest
     possible share is followed. ``followed`` tells what remains. Without a command the
-    output is the input itself, and ``followed`` is 0.
+    output is the input itself, and ``followed`` is 0; so it is if ``config`` does not
+    want it bent.
 
     The command is sampled every ``UPDATE_PERIOD`` into the state, of which the outputs
     are functions. ``fixed_time`` and ``clock_rate`` come from the smoother; without
@@ -80,7 +83,7 @@ class Steering(PlanProducer):
 
     Args:
         robot: the robot.
-        config: response of the filter.
+        config: response of the filter, and what it is for.
 
     Raises:
         InputError: if a number in ``config`` is out of its bounds or, during a
@@ -102,6 +105,9 @@ class Steering(PlanProducer):
         self.DeclareVectorOutputPort(
             "followed", 3, self._calc_followed, prerequisites_of_calc={self.xa_ticket()}
         )
+        self.DeclareVectorOutputPort(
+            "told", 3, self._calc_told, prerequisites_of_calc={self.xa_ticket()}
+        )
 
     def _calc_plan(self, context: Context, output: AbstractValue) -> None:
         course = self._get(context)
@@ -116,11 +122,19 @@ class Steering(PlanProducer):
         else:
             output.set_value(course.clock_rate * course.steered.command)
 
+    def _calc_told(self, context: Context, output: Any) -> None:
+        output.set_value(self._get(context).command or [nan] * 3)
+
     def _next(self, context: Context, course: _Course) -> _Course:
         if not self._command.HasValue(context):
             return course
-        raw = self._plan.Eval(context)
         command = self._command.Eval(context)
+        if not self._config.bend:
+            check_finite(command)
+            if tuple(command) == course.command:
+                return course
+            return replace(course, command=tuple(command))
+        raw = self._plan.Eval(context)
         fixed = context.get_time()
         if self._fixed_time.HasValue(context):
             fixed = float(self._fixed_time.Eval(context)[0])

@@ -8,6 +8,7 @@ from pydrake.systems.analysis import Simulator
 
 from loco_drake.common.errors import InputError
 from loco_drake.control.actor import Actor, ActorConfig, load_actor, save_actor
+from loco_drake.control.plan import first_change
 from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import policy_path, policy_variants, pretrained_dir
 from loco_drake.motion.motion_file import save_motion
@@ -19,6 +20,7 @@ from loco_drake.systems.scenario import (
     MotionReference,
     PlanReference,
     Scenario,
+    SteeringConfig,
     TrainedPolicy,
 )
 from loco_drake.systems.simulator import StartEpisode
@@ -96,6 +98,42 @@ def test_a_cloned_context_goes_the_same_way(generated):
     clone.AdvanceTo(1.5)
     np.testing.assert_array_equal(port.Eval(clone.get_context()), first)
     np.testing.assert_array_equal(port.Eval(simulator.get_context()), first)
+
+
+def test_a_generator_is_told_the_command_if_the_scenario_wants_it(weights, generated):
+    """Without a command the states are those of any other diagram, to the last bit."""
+    scenario = Scenario(
+        reference=GeneratedReference(gait="dog-pace", seed=1),
+        steering=SteeringConfig(tell=True, bend=False),
+        policy=TrainedPolicy(weights=weights),
+    )
+    diagram = MakeLocomotionDiagram(scenario)
+    np.testing.assert_array_equal(states(diagram, [1.0]), states(generated, [1.0]))
+    simulator = Simulator(diagram)
+    StartEpisode(simulator)
+    context = simulator.get_mutable_context()
+    before = diagram.GetOutputPort("plan").Eval(context)
+    diagram.GetInputPort("command").FixValue(context, [0.6, 0.0, 0.7])
+    reference = diagram.GetSubsystemByName("reference")
+    raw = reference.GetOutputPort("plan")
+    own = reference.GetMyContextFromRoot(context)
+    told_before = raw.Eval(own)
+    simulator.AdvanceTo(0.5)
+    plan = diagram.GetOutputPort("plan").Eval(context)
+    assert 0.16 < first_change(told_before, raw.Eval(own)) < 0.5
+    assert first_change(before, plan) < 0.6
+    np.testing.assert_array_equal(diagram.GetOutputPort("followed").Eval(context), 0)
+
+
+def test_a_played_motion_is_not_told(tmp_path, weights):
+    save_motion(synthetic_motion("dog-trot", 2.0, 0.5), tmp_path / "trot.npz")
+    scenario = Scenario(
+        reference=MotionReference(path=tmp_path / "trot.npz"),
+        steering=SteeringConfig(tell=True),
+        policy=TrainedPolicy(weights=weights),
+    )
+    reference = MakeLocomotionDiagram(scenario).GetSubsystemByName("reference")
+    assert not reference.HasInputPort("command")
 
 
 def test_the_plan_can_come_from_a_motion_file(tmp_path, weights):

@@ -5,7 +5,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import quat_error
-from loco_drake.control.plan import PLAN_DT
+from loco_drake.control.plan import PLAN_DT, first_change
 from loco_drake.motion.gaits import parse_label
 from loco_drake.systems.reference_generator import ReferenceGenerator
 from loco_drake.systems.scenario import GeneratedReference
@@ -149,6 +149,92 @@ def test_clones_and_resets_repeat_a_change_of_gait(how, go2, model):
     context.SetTime(0.0)
     again = run(context, 6.0)
     np.testing.assert_array_equal(ours.state, again.state)
+
+
+@pytest.fixture(scope="module")
+def told(go2):
+    """A generator that can be told velocities."""
+    model = make_tiny_model(told=True)
+    return ReferenceGenerator(go2, GeneratedReference(seed=3), model)
+
+
+def tell(system, context, command):
+    system.GetInputPort("command").FixValue(context, command)
+
+
+def test_without_a_command_it_writes_as_one_that_cannot_be_told(generator, told):
+    q, _ = samples(generator, 2.0)
+    np.testing.assert_array_equal(samples(told, 2.0)[0], q)
+    simulator = Simulator(told)
+    tell(told, simulator.get_mutable_context(), [np.nan] * 3)
+    simulator.AdvanceTo(2.0)
+    plan = plan_at(told, simulator.get_context())
+    first = round(plan.start_time / PLAN_DT)
+    np.testing.assert_array_equal(plan.q, q[first:][: len(plan)])
+
+
+def test_a_new_command_is_told_from_the_next_token_on(told, model):
+    simulator = Simulator(told)
+    context = simulator.get_mutable_context()
+    tell(told, context, [0.5, 0.0, 0.0])
+    simulator.AdvanceTo(1.0)
+    before = plan_at(told, context)
+    tell(told, context, [0.5, 0.0, 0.9])
+    simulator.AdvanceTo(1.06)  # the update is at 1.04 s
+    after = plan_at(told, context)
+    late = first_change(before, after) - 1.04
+    assert 0.1 <= late <= 0.1 + (model.frames_per_token + 1) * PLAN_DT
+    v, q = after.v[1:-1, 3:], after.q[:, 4:]
+    np.testing.assert_allclose(v, (q[2:] - q[:-2]) / (2 * PLAN_DT), atol=1e-6)
+
+
+def test_small_changes_of_a_command_are_not_told(told):
+    """Within .05 of what was told last, however many there are; then it is told."""
+    simulator = Simulator(told)
+    context = simulator.get_mutable_context()
+    tell(told, context, [0.5, 0.0, 0.0])
+    simulator.AdvanceTo(0.3)
+    plan = plan_at(told, context)
+    for k in range(1, 6):
+        tell(told, context, [0.5, 0.0, 0.01 * k - 0.001])
+        simulator.AdvanceTo(0.3 + 0.08 * k)
+    assert first_change(plan, plan_at(told, context)) > plan.path_time[-1]
+    tell(told, context, [0.5, 0.0, 0.051])
+    simulator.AdvanceTo(0.9)
+    assert first_change(plan, plan_at(told, context)) < plan.path_time[-1]
+
+
+def test_clones_and_resets_repeat_what_was_told(told):
+    """To the last bit, also when the context is cloned on the way."""
+
+    def run(context, end):
+        simulator = Simulator(told, context)
+        for time in np.arange(context.get_time(), end, 0.1):
+            tell(told, context, [0.5, 0.0, 0.0 if time < 1.05 else 0.8])
+            simulator.AdvanceTo(min(time + 0.1, end))
+        return plan_at(told, context)
+
+    context = told.CreateDefaultContext()
+    run(context, 1.3)
+    clone = context.Clone()
+    ours, theirs = run(context, 4.0), run(clone, 4.0)
+    assert ours is not theirs
+    np.testing.assert_array_equal(ours.state, theirs.state)
+    told.SetDefaultContext(context)
+    context.SetTime(0.0)
+    np.testing.assert_array_equal(run(context, 4.0).state, ours.state)
+
+
+def test_a_command_that_is_none_is_refused(told, generator):
+    for system, command, message in (
+        (told, [0.5, np.nan, 0.0], "three finite numbers"),
+        (told, [0.5, np.inf, 0.0], "three finite numbers"),
+        (generator, [0.5, 0.0, 0.0], "not taught velocities"),
+    ):
+        simulator = Simulator(system)
+        tell(system, simulator.get_mutable_context(), command)
+        with pytest.raises(InputError, match=message):
+            simulator.AdvanceTo(0.5)
 
 
 @pytest.mark.parametrize("gait", [99.0, -1.0, 3.7, -0.5, 0.001, 7.0, np.nan, np.inf])

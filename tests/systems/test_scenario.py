@@ -69,6 +69,8 @@ BAD = {
     "visualization: {publish_period: 0}": "publish_period must be",
     "policy: !!python/object/apply:os.getcwd []": "cannot be read",
     "disturbances: {pushes: 3}": "cannot be read",
+    "steering: {tell: 3}": "cannot be read",
+    "steering: {response: 0}": "steering's response must be a number",
     "[": "cannot be read",
     "3": "cannot be read",
     "robot: \x00": "cannot be read",

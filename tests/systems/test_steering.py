@@ -28,16 +28,20 @@ def add(builder, name, system, plan):
     return system
 
 
-def build(robot, reference, limits=None, steering=True):
+def build(robot, reference, limits=None, steering=True, **options):
     """A reference, steering and a smoother, connected as in a locomotion diagram."""
     builder = DiagramBuilder()
     builder.AddNamedSystem("reference", reference)
     chain = [reference]
     if steering:
-        system = Steering(robot, SteeringConfig(measured_ranges=False))
+        config = SteeringConfig(measured_ranges=False, **options)
+        system = Steering(robot, config)
         chain.append(add(builder, "steering", system, reference.GetOutputPort("plan")))
         builder.ExportInput(system.GetInputPort("command"), "command")
         builder.ExportOutput(system.GetOutputPort("followed"), "followed")
+        if config.tell:
+            told = system.GetOutputPort("told")
+            builder.Connect(told, reference.GetInputPort("command"))
     smoother = ToppraSmoother(robot, limits=limits)
     add(builder, "smoother", smoother, chain[-1].GetOutputPort("plan"))
     for system in chain:
@@ -194,6 +198,67 @@ def test_another_gait_is_written_from_the_next_tokens_on(go2, model):
     step = np.abs(np.diff(q[:, 4:], axis=0)).max(axis=1)
     around = slice(round(STEP / PLAN_DT), round((STEP + 0.6) / PLAN_DT))
     assert step[around].max() <= 1.5 * step.max()
+
+
+@pytest.fixture(scope="module")
+def telling(go2):
+    """A diagram for each way of steering a generator that can be told velocities."""
+    model = make_tiny_model(told=True)
+    return {
+        (bend, tell): build(
+            go2,
+            ReferenceGenerator(go2, GeneratedReference(), model),
+            bend=bend,
+            tell=tell,
+        )
+        for bend in (False, True)
+        for tell in (False, True)
+    }
+
+
+def test_without_a_command_nothing_is_told(telling):
+    runs = [run(diagram, [], 2.0)[0] for diagram in telling.values()]
+    for other in runs[1:]:
+        np.testing.assert_array_equal(runs[0], other)
+
+
+def test_a_plan_is_bent_and_its_generator_told_as_is_wanted(telling):
+    """What is told comes later than what is bent, which begins as it would alone."""
+    commands = [(STEP, [0.4, 0.0, 0.9])]
+    without = run(telling[False, False], [], 3.0)[0]
+    found = {way: run(d, commands, 3.0)[0] for way, d in telling.items()}
+    np.testing.assert_array_equal(found[False, False], without)
+    assert (found[True, True] != found[True, False]).any()
+    bent, told, both = (
+        np.flatnonzero((found[way] != without).any(axis=1))[0]
+        for way in ((True, False), (False, True), (True, True))
+    )
+    assert bent == both < told <= bent + round(0.4 / PLAN_DT)
+
+
+@pytest.mark.parametrize("at", [STEP + 0.02, STEP + 0.2, STEP + 0.5])
+def test_a_clone_goes_on_identically_while_it_is_told(telling, at):
+    commands = [(0.0, [0.4, 0.0, 0.0]), (STEP, [0.4, 0.0, 0.9])]
+    diagram = telling[True, True]
+    context = diagram.CreateDefaultContext()
+    run(diagram, commands, at, context)
+    clone = context.Clone()
+    ours, _ = run(diagram, commands, 3.0, context)
+    theirs, _ = run(diagram, commands, 3.0, clone)
+    np.testing.assert_array_equal(ours, theirs)
+    diagram.SetDefaultContext(context)
+    context.SetTime(0.0)
+    again, _ = run(diagram, commands, 3.0, context)
+    np.testing.assert_array_equal(ours, again[-len(ours) :])
+
+
+def test_a_command_that_is_only_told_must_be_finite_too(telling):
+    diagram = telling[False, True]
+    simulator = Simulator(diagram)
+    context = simulator.get_mutable_context()
+    diagram.GetInputPort("command").FixValue(context, [np.nan] * 3)
+    with pytest.raises(InputError, match="three finite numbers"):
+        simulator.AdvanceTo(0.5)
 
 
 @pytest.mark.parametrize("at", [STEP + 0.02, STEP + 0.11, STEP + 0.3])
