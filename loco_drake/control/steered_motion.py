@@ -8,7 +8,7 @@ import numpy as np
 from loco_drake.common.arrays import Array
 from loco_drake.control.command import CommandRange
 from loco_drake.control.ground_path import ground_pose, path_velocity
-from loco_drake.control.plan import plan_from_motion
+from loco_drake.control.plan import Plan, plan_from_motion
 from loco_drake.control.state import (
     ANGULAR_VELOCITY,
     JOINT_VELOCITIES,
@@ -65,16 +65,9 @@ def steered_motion(robot: Robot, motion: Motion, seed: int | Sequence[int]) -> M
     for time in np.arange(0.0, plan.end_time, PERIOD):
         commands.append(_drawn(within, random))
         steered = steer(robot, steered, plan, commands[-1], float(time), _RESPONSE)
-    moved = steered.plan
     apart = np.abs(steered.speed - plain.speed).mean(axis=0)
     return replace(
-        motion,
-        base_position=moved.q[POSITION],
-        base_quaternion=moved.q[ORIENTATION],
-        joint_positions=moved.q[JOINTS],
-        base_velocity=moved.v[VELOCITY],
-        base_angular_velocity=moved.v[ANGULAR_VELOCITY],
-        joint_velocities=moved.v[JOINT_VELOCITIES],
+        moved_as(motion, steered.plan),
         provenance={
             **motion.provenance,
             "steered": "; ".join(
@@ -84,6 +77,19 @@ def steered_motion(robot: Robot, motion: Motion, seed: int | Sequence[int]) -> M
             "steered_by": f"{apart[0]:.3f} m/s forward, {apart[1]:.3f} m/s sideways, "
             f"{apart[2]:.3f} rad/s on average",
         },
+    )
+
+
+def moved_as(motion: Motion, plan: Plan) -> Motion:
+    """Returns ``motion`` with base and joints of a plan of as many samples."""
+    return replace(
+        motion,
+        base_position=plan.q[POSITION],
+        base_quaternion=plan.q[ORIENTATION],
+        joint_positions=plan.q[JOINTS],
+        base_velocity=plan.v[VELOCITY],
+        base_angular_velocity=plan.v[ANGULAR_VELOCITY],
+        joint_velocities=plan.v[JOINT_VELOCITIES],
     )
 
 

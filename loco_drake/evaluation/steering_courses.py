@@ -63,8 +63,8 @@ def keeps_goals(errors: Sequence[Array]) -> bool:
     return velocity <= VELOCITY_GOAL and yaw_rate <= YAW_RATE_GOAL
 
 
-def grid(within: CommandRange) -> list[Array]:
-    """Returns the commands of the grid: the middle, points on the axes, the corners."""
+def axis_points(within: CommandRange) -> list[Array]:
+    """Returns the command in the middle and four others on each axis that is wide."""
     low, high, middle = np.array(within.low), np.array(within.high), within.middle
     wide = high - low > LEAST
     points = [middle]
@@ -73,10 +73,18 @@ def grid(within: CommandRange) -> list[Array]:
             point = middle.copy()
             point[axis] = low[axis] + share * (high[axis] - low[axis])
             points.append(point)
+    return points
+
+
+def grid(within: CommandRange) -> list[Array]:
+    """Returns the commands of the grid: the middle, points on the axes, the corners."""
+    low, high, middle = np.array(within.low), np.array(within.high), within.middle
+    wide = high - low > LEAST
     sides = [
         (low[axis], high[axis]) if wide[axis] else (middle[axis],) for axis in range(3)
     ]
-    return points + [np.array(corner) for corner in itertools.product(*sides)]
+    corners = [np.array(corner) for corner in itertools.product(*sides)]
+    return axis_points(within) + corners
 
 
 def steps(within: CommandRange) -> Iterator[tuple[Array, Array]]:

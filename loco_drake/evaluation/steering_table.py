@@ -60,7 +60,7 @@ from loco_drake.motion.quality import (
 )
 from loco_drake.systems.scenario import Scenario
 
-_POINT, _SETTLING = 6.0, 2.0  # s
+POINT, SETTLING = 6.0, 2.0  # s of a point, and of those that do not count
 _DRIVE, _CHANGE = 60.0, 2.0  # s
 # Points of the search, m/s and rad/s; sideways and turning are tried to both sides.
 _FORWARD_STEP = 0.25
@@ -78,17 +78,18 @@ _SHRINK = (
 )
 
 
-class _Driver:
+class Driver:
     """Measures one label after the other in one diagram."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self._robot = get_robot(scenario.robot)
-        self._damping = plant_damping(self._robot, scenario.plant)
+        self.robot = get_robot(scenario.robot)
+        self._damping = plant_damping(self.robot, scenario.plant)
         self._recorder = Recorder(scenario)
         self._command = self._recorder.diagram.GetInputPort("command")
         self._plan = self._recorder.diagram.GetOutputPort("plan")
 
     def __call__(self, course: Course) -> dict[str, Any]:
+        """Returns the figures of a course."""
         seed = course.seeds[0]
         within = course.range or self._search(course.label, seed)
         points = [self._point(course.label, c, seed) for c in grid(within)]
@@ -162,17 +163,21 @@ class _Driver:
         near: bool = drive["distance_from_plan_max_m"] <= DISTANCE_GOAL
         return near and drive["fall_rate"] == 0
 
+    def plan_of(self, name: str) -> Plan:
+        """Returns the present plan of a subsystem: reference, steering or smoother."""
+        system = self._recorder.diagram.GetSubsystemByName(name)
+        context = system.GetMyContextFromRoot(self._recorder.context)
+        plan: Plan = system.GetOutputPort("plan").Eval(context)
+        return plan
+
     def _pace(self, label: str, seed: int) -> Array:
         """Returns the mean velocity of the gait's plan without a command, (3,)."""
         self._recorder.start(gait=label, seed=seed)
-        reference = self._recorder.diagram.GetSubsystemByName("reference")
-        plan = reference.GetOutputPort("plan").Eval(
-            reference.GetMyContextFromRoot(self._recorder.context)
-        )
+        plan = self.plan_of("reference")
         mean: Array = path_velocity(ground_pose(plan.q)).mean(axis=0)
         return mean
 
-    def _run(
+    def run(
         self,
         label: str,
         seed: int,
@@ -194,10 +199,10 @@ class _Driver:
         return rollout
 
     def _point(self, label: str, command: Array, seed: int) -> Point:
-        rollout = self._run(label, seed, _POINT, lambda _: command)
-        counted = round(_SETTLING / PLAN_DT)
-        velocity = stride_velocity(self._robot, rollout.state)[counted:]
-        effort = effort_metrics(rollout, self._robot, self._damping)
+        rollout = self.run(label, seed, POINT, lambda _: command)
+        counted = round(SETTLING / PLAN_DT)
+        velocity = stride_velocity(self.robot, rollout.state)[counted:]
+        effort = effort_metrics(rollout, self.robot, self._damping)
         return Point(
             command=command,
             velocities=velocity,
@@ -207,16 +212,16 @@ class _Driver:
         )
 
     def _steps(self, label: str, within: CommandRange, seed: int) -> dict[str, Any]:
-        changed = round(_POINT / 2 / PLAN_DT)
+        changed = round(POINT / 2 / PLAN_DT)
         reference: list[float | None] = []
         robot: list[float | None] = []
         for before, after in steps(within):
             plans: list[Plan] = []
-            rollout = self._run(
-                label, seed, _POINT, partial(_step, before, after, changed), plans
+            rollout = self.run(
+                label, seed, POINT, partial(_step, before, after, changed), plans
             )
             reference.append(reference_latency(plans, changed))
-            velocity = stride_velocity(self._robot, rollout.state)
+            velocity = stride_velocity(self.robot, rollout.state)
             robot.append(
                 None
                 if rollout.fell
@@ -241,15 +246,15 @@ class _Driver:
             )
             plans: list[Plan] = []
             command = partial(_from_table, table, round(_CHANGE / PLAN_DT))
-            rollout = self._run(label, seed, _DRIVE, command, plans)
+            rollout = self.run(label, seed, _DRIVE, command, plans)
             drives.append((rollout, plans))
         p_WF = [
             np.array([p.p_WF[p.index(k * PLAN_DT)] for k, p in enumerate(plans)])
             for _, plans in drives
         ]
-        radius = self._robot.foot_radius
+        radius = self.robot.foot_radius
         plan_slip = np.concatenate([stance_slip_speeds(p, radius, FPS) for p in p_WF])
-        slip = np.concatenate([slip_speeds(r, self._robot) for r, _ in drives])
+        slip = np.concatenate([slip_speeds(r, self.robot) for r, _ in drives])
         rollouts = [rollout for rollout, _ in drives]
         return {
             "fall_rate": float(np.mean([r.fell for r in rollouts])),
@@ -263,7 +268,7 @@ class _Driver:
             "plan_slip_median_mps": median(plan_slip),
             "plan_penetration_max_m": max(penetration_max(p, radius) for p in p_WF),
             "plan_joint_limit_violations": sum(
-                joint_limit_violations(r.plan_state[:, 7:19], self._robot)
+                joint_limit_violations(r.plan_state[:, 7:19], self.robot)
                 for r in rollouts
             ),
             "stretch": float(np.mean([stretch(r) for r in rollouts])),
@@ -284,7 +289,7 @@ def run_courses(
     scenario: Scenario, courses: Sequence[Course], workers: int = 1
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yields label and figures of each course, in order."""
-    results = map_in_workers(partial(_Driver, scenario), courses, workers)
+    results = map_in_workers(partial(Driver, scenario), courses, workers)
     return zip((course.label for course in courses), results, strict=True)
 
 

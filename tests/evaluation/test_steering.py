@@ -13,7 +13,7 @@ from loco_drake.evaluation.steering import (
     stride_of,
     stride_velocity,
 )
-from loco_drake.evaluation.steering_courses import grid, steps
+from loco_drake.evaluation.steering_courses import axis_points, grid, steps
 from loco_drake.evaluation.steering_table import overall
 from tests.synthetic_motion import synthetic_motion
 
@@ -98,6 +98,13 @@ def test_the_grid_has_five_values_of_each_axis_and_the_corners():
     # An axis without width adds no point twice.
     flat = CommandRange((0.2, 0.0, -1.0), (0.8, 0.0, 1.0))
     assert len(grid(flat)) == 1 + 2 * 4 + 4
+
+
+def test_axis_points_are_those_of_the_grid_without_the_corners():
+    points, narrow = axis_points(BOX), CommandRange((1, 0, -1), (1, 0, 1))
+    assert [p.tolist() for p in points] == [p.tolist() for p in grid(BOX)[:13]]
+    turns = [point.tolist() for point in axis_points(narrow)]
+    assert turns == [[1, 0, w] for w in (0, -1, -0.5, 0.5, 1)]
 
 
 def test_steps_go_to_both_ends_of_speed_and_turning_and_back():
