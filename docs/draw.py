@@ -8,6 +8,7 @@ need Chromium on the path (``chromium``, headless), `retargeting` the recordings
     python docs/draw.py gait-change docs/images/gait_change.png
     python docs/draw.py library docs/images/library.png
     python docs/draw.py steering docs/images
+    python docs/draw.py gait-choice docs/images/gait_choice.png
 
 ``loco-drake evaluate ... --figures`` draws the others.
 """
@@ -30,6 +31,7 @@ from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments, select_labels
 from loco_drake.evaluation.dataset_picture import describe, library_figure
 from loco_drake.evaluation.gait_change import change_figure
+from loco_drake.evaluation.gait_choice_picture import choice_figure
 from loco_drake.evaluation.steering_pictures import grid_figure, steering_figures
 from loco_drake.evaluation.tracking import Recorder, dress
 from loco_drake.generation.generate import generate_motions
@@ -43,6 +45,7 @@ from loco_drake.motion.motion import FPS
 from loco_drake.motion.motion_file import load_motion
 from loco_drake.retargeting.retarget import retarget_clip
 from loco_drake.retargeting.scaling import resample
+from loco_drake.systems.gait_selector import measured_gaits
 from loco_drake.systems.keypoint_visualizer import COLORS, NAMES
 from loco_drake.systems.scenario import (
     GeneratedReference,
@@ -227,6 +230,12 @@ def steering(
         write_figure(picture, folder / name, dpi=80)
 
 
+def gait_choice(png: Png) -> None:
+    """The gait that a command chooses, by what ``evaluate steering`` measured."""
+    gaits = {name: measured_gaits(get_robot(name)) for name in ROBOTS}
+    write_figure(choice_figure(gaits), png, dpi=80)
+
+
 def take_picture(meshcat: Meshcat, png: Path, size: tuple[int, int]) -> None:
     """Writes a picture of what Meshcat shows, ``size`` pixels wide and high."""
     png.parent.mkdir(parents=True, exist_ok=True)
@@ -249,5 +258,6 @@ if __name__ == "__main__":
         "gait-change": gait_change,
         "library": library,
         "steering": steering,
+        "gait-choice": gait_choice,
     }
     tyro.extras.subcommand_cli_from_dict(pictures)

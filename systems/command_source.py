@@ -18,7 +18,7 @@ class CommandSource(LeafSystem):
         name: CommandSource
         output_ports:
         - command: vector (3,), forward, sideways, yaw rate in H; m/s, rad/s
-        - gait: vector (1,), index into LABELS
+        - gait: vector (1,), index into LABELS, or -1 for any
         - events: vector (2,), push to the left and whether to reset; N s, 1 or 0
 
     The outputs are the state and nothing else, so a Context can be cloned, and orders

@@ -1,9 +1,10 @@
 """The diagram of a robot that tracks a plan."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
+import numpy as np
 from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
@@ -19,10 +20,12 @@ from pydrake.visualization import ApplyVisualizationConfig
 
 from loco_drake.common.errors import InputError
 from loco_drake.control.actor import load_actor
+from loco_drake.control.gait_choice import best_gait
 from loco_drake.control.plan import plan_from_motion
 from loco_drake.models.plant import AddRobotPlant
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.models.shipped import policy_path
+from loco_drake.motion.gaits import ANY, gait_name
 from loco_drake.motion.motion_file import load_motion
 
 from .control import (
@@ -35,6 +38,7 @@ from .control import (
     TrackingReward,
 )
 from .domain import Actuation, Pushes, Sensors
+from .gait_selector import GaitSelector, measured_gaits
 from .keypoint_visualizer import KeypointVisualizer
 from .scenario import (
     ExternalTargets,
@@ -76,7 +80,8 @@ def MakeLocomotionDiagram(
 
         name: LocomotionDiagram
         input_ports:
-        - gait: vector (1,), index into LABELS; only of a generated reference, optional
+        - gait: vector (1,), index into LABELS, or with steering -1 for any; only of a
+          generated reference, optional
         - command: vector (3,), velocity to follow: forward, sideways, yaw rate, in the
           heading frame; m/s, rad/s; optional
         - action: vector (J,); ACTION_SCALE; only with ExternalAction
@@ -97,8 +102,9 @@ def MakeLocomotionDiagram(
     quaternions in plan_state and state have length one.
 
     The subsystems are named plant, scene_graph, robot_state, reference, steering,
-    smoother, observation, policy, joint_targets, plan_state and reward; the scenario's
-    disturbances add actuation, pushes and sensors. ``meshcat`` shows the robot and the
+    smoother, observation, policy, joint_targets, plan_state and reward; a generated
+    reference that is steered adds gait_selector, and the scenario's disturbances add
+    actuation, pushes and sensors. ``meshcat`` shows the robot and the
     plan's keypoints.
 
     A robot must start on its plan: use :func:`.simulator.MakeSimulator` and
@@ -228,6 +234,12 @@ def AddPlan(
             told = steering.GetOutputPort("told")
             builder.Connect(told, reference.GetInputPort("command"))
         chain.append(steering)
+        if isinstance(scenario.reference, GeneratedReference):
+            selector = GaitSelector(robot, str(scenario.reference.gait))
+            command = steering.GetOutputPort("asked")
+            _Add(builder, "gait_selector", selector, command=command)
+            builder.Connect(selector.GetOutputPort("gait"), inputs["gait"])
+            inputs["gait"] = selector.GetInputPort("gait")
     if scenario.smoother is not None:
         smoother = ToppraSmoother(robot, scenario.smoother)
         _Add(builder, "smoother", smoother, plan=chain[-1].GetOutputPort("plan"))
@@ -246,6 +258,9 @@ def _MakeReference(robot: Robot, scenario: Scenario) -> LeafSystem:
         # Imports torch models, which a player does not need.
         from .reference_generator import ReferenceGenerator
 
+        if reference.gait == ANY:
+            gait = best_gait(measured_gaits(robot), np.zeros(3))
+            reference = replace(reference, gait=gait_name(gait))
         return ReferenceGenerator(robot, reference)
     if isinstance(reference, MotionReference):
         return PlanPlayer(robot, plan_from_motion(robot, load_motion(reference.path)))

@@ -9,7 +9,7 @@ from pydrake.geometry import Meshcat
 
 from loco_drake.common.arrays import Array
 from loco_drake.control.driving import COMMAND, GAIT, ORDERS, PUSH, RESET
-from loco_drake.motion.gaits import LABELS, GaitLabel
+from loco_drake.motion.gaits import gait_index
 
 # Name, least, most, step, and the keys to go down and up. Of a command, in its order,
 # m/s and rad/s. The page has room for fifteen letters.
@@ -79,22 +79,20 @@ class MeshcatDriver:
 
     Args:
         meshcat: the Meshcat whose page gets the controls.
-        labels: gaits to choose from.
+        gaits: gaits to choose from: labels, or any.
         gait: the gait at the beginning.
     """
 
-    def __init__(
-        self, meshcat: Meshcat, labels: Sequence[GaitLabel], gait: GaitLabel
-    ) -> None:
+    def __init__(self, meshcat: Meshcat, gaits: Sequence[str], gait: str) -> None:
         self._meshcat = meshcat
-        self._labels, self._gait = labels, labels.index(gait)
+        self._gaits, self._gait = gaits, gaits.index(gait)
         self._pushed = -_PUSH_PAUSE
         self._had_gamepad = False
         #: What was limited or is missing, for the driver to see.
         self.notes: tuple[str, ...] = ()
         for name, low, high, step, down, up in SLIDERS:
             meshcat.AddSlider(name, low, high, step, 0.0, down, up)
-        buttons = {**_KEYS, **dict.fromkeys(map(str, labels), "")}
+        buttons = {**_KEYS, **dict.fromkeys(gaits, "")}
         for name, key in buttons.items():
             meshcat.AddButton(name, key)
         self._clicks = dict.fromkeys(buttons, 0)
@@ -116,12 +114,12 @@ class MeshcatDriver:
                 self._meshcat.SetSliderValue(name, 0.0)
         orders = np.zeros(ORDERS)
         orders[COMMAND] = self._command()
-        for number, label in enumerate(self._labels):
-            if str(label) in pressed:
+        for number, gait in enumerate(self._gaits):
+            if gait in pressed:
                 self._gait = number
         step = sum(GAIT_STEPS[name] for name in pressed & GAIT_STEPS.keys())
-        self._gait = (self._gait + step) % len(self._labels)
-        orders[GAIT] = LABELS.index(self._labels[self._gait])
+        self._gait = (self._gait + step) % len(self._gaits)
+        orders[GAIT] = gait_index(self._gaits[self._gait])
         pushes = sorted(pressed & PUSHES.keys())
         if pushes and time >= self._pushed + _PUSH_PAUSE:
             orders[PUSH] = PUSHES[pushes[0]]

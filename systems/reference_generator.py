@@ -66,7 +66,7 @@ class ReferenceGenerator(PlanProducer):
 
         name: ReferenceGenerator
         input_ports:
-        - gait: vector (1,), index into LABELS; optional
+        - gait: vector (1,), index into LABELS, nan for the configured one; optional
         - path_time: vector (1,), how much of the plan has been used; s; optional
         - fixed_time: vector (1,), plan time up to which nothing changes; s; optional
         - command: vector (3,), velocity to be told: forward, sideways, yaw rate in H;
@@ -147,8 +147,9 @@ class ReferenceGenerator(PlanProducer):
         fixed = used
         if self._fixed_time.HasValue(context):
             fixed = float(self._fixed_time.Eval(context)[0])
-        if self._gait.HasValue(context):
-            schedule = GaitSchedule((self._label(self._gait.Eval(context)[0]),))
+        asked = self._gait.Eval(context)[0] if self._gait.HasValue(context) else np.nan
+        if not np.isnan(asked):
+            schedule = GaitSchedule((self._label(asked),))
             if schedule != script.schedule:
                 script = self._rewound(script, fixed + UPDATE_PERIOD + PLAN_DT)
                 script = replace(script, schedule=schedule)

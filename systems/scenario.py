@@ -13,7 +13,7 @@ from loco_drake.common.typed_yaml import refuse_repeated_keys
 from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS
-from loco_drake.motion.gaits import parse_schedule
+from loco_drake.motion.gaits import ANY, gait_index, parse_schedule
 
 # Of a scenario's text: the loader recurses at each bracket, and copies at each alias.
 _MAX_SIZE = 100_000
@@ -26,7 +26,8 @@ _MAX_BRACKETS = 200
 class GeneratedReference:
     """Motion generated while the simulation runs."""
 
-    gait: str = "dog-trot"  # or a schedule such as dog-pace,dog-trot@3
+    # Or a schedule such as dog-pace,dog-trot@3, or any, if the command is to choose.
+    gait: str = "dog-trot"
     seed: int = 0  # of the tokens
     # Intended duration in s, which conditions the generator; the motion has no end.
     duration: float = 10.0
@@ -35,7 +36,10 @@ class GeneratedReference:
 
     def check(self) -> None:
         """Raises InputError unless every field is valid."""
-        parse_schedule(str(self.gait))
+        if "," in str(self.gait):
+            parse_schedule(self.gait)
+        else:
+            gait_index(str(self.gait))
         whole = isinstance(self.seed, int | np.integer)
         if not (whole and 0 <= self.seed < 2**63):
             raise InputError(f"The seed must be 0 or more, not {self.seed!s:.40}.")
@@ -158,6 +162,8 @@ class Scenario:
         for part in (self.plant, self.reference, self.steering, self.smoother):
             if not isinstance(part, MotionReference | PlanReference | None):
                 part.check()
+        if getattr(self.reference, "gait", None) == ANY and self.steering is None:
+            raise InputError("The gait any needs steering, whose command chooses it.")
         rate = self.simulator.target_realtime_rate
         check_number("The simulator's target_realtime_rate", rate, 0.0)
         if repr(self.simulator) != repr(SimulatorConfig(target_realtime_rate=rate)):

@@ -114,7 +114,8 @@ def StartEpisode(
 
     Args:
         simulator: of a diagram as in :class:`LocomotionSimulator`.
-        gait: replaces the scenario's gait of a generated reference.
+        gait: replaces the scenario's gait of a generated reference. With "any" it
+            begins with the gait that goes with the command at time 0, or on the spot.
         seed: replaces the scenario's seed of a generated reference.
         plan: replaces the plan of a reference that plays plans.
         domain: how the world differs from the model; the scenario must have the
@@ -155,8 +156,13 @@ def SetReference(diagram: Diagram, root: Context, **given: Any) -> None:
     """Passes gait, seed or plan, where they are not None, to the reference.
 
     Raises:
-        InputError: if the reference does not accept an argument.
+        InputError: if the reference does not accept an argument, or any gait is asked
+            for and nothing was measured of the robot.
     """
+    if diagram.HasSubsystemNamed("gait_selector"):
+        selector = diagram.GetSubsystemByName("gait_selector")
+        context = selector.GetMyMutableContextFromRoot(root)
+        given["gait"] = selector.SetGait(context, given.get("gait"))
     given = {name: value for name, value in given.items() if value is not None}
     if not given:
         return

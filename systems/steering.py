@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from math import nan
 from typing import Any
 
+import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context
 
@@ -66,6 +67,7 @@ class Steering(PlanProducer):
         - clock_rate: vector (1,), seconds of the plan per second; optional
         output_ports:
         - plan: abstract, Plan; on the clock of the input
+        - asked: vector (3,), the command as it is given, nan without one; m/s, rad/s
         - followed: vector (3,), the command as far as it is followed; m/s, rad/s
         - told: vector (3,), the command as it was sampled, NaN without one; m/s, rad/s
 
@@ -103,6 +105,9 @@ class Steering(PlanProducer):
         self._clock_rate = self.DeclareVectorInputPort("clock_rate", 1)
         self._DeclarePlan(_Course(rest), self._plan.ticket())
         self.DeclareVectorOutputPort(
+            "asked", 3, self._calc_asked, prerequisites_of_calc={self._command.ticket()}
+        )
+        self.DeclareVectorOutputPort(
             "followed", 3, self._calc_followed, prerequisites_of_calc={self.xa_ticket()}
         )
         self.DeclareVectorOutputPort(
@@ -114,6 +119,10 @@ class Steering(PlanProducer):
         output.set_value(
             self._plan.Eval(context) if course.steered is None else course.plan
         )
+
+    def _calc_asked(self, context: Context, output: Any) -> None:
+        given = self._command.HasValue(context)
+        output.set_value(self._command.Eval(context) if given else [np.nan] * 3)
 
     def _calc_followed(self, context: Context, output: Any) -> None:
         course = self._get(context)

@@ -75,6 +75,8 @@ def steering(robot="go2", **changes):
         "yaw_rate_rmse_radps": 0.05,
         "latency_reference_s": 0.26,
         "latency_robot_s": 0.9,
+        "gait_change_s": 1.1,
+        "gait_change_max_s": 1.7,
         "fall_rate": 0.03,
         "normalized_return": 88.0,
         "stretch": 1.01,

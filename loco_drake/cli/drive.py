@@ -20,7 +20,7 @@ from loco_drake.cli.simulation import (
     start_meshcat,
 )
 from loco_drake.common.errors import InputError
-from loco_drake.motion.gaits import LABELS, parse_label
+from loco_drake.motion.gaits import ANY, ANY_INDEX, GAIT_CHOICES
 
 if TYPE_CHECKING:
     from loco_drake.control.drive_file import Drive as DriveFile
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 # Seconds that a table of commands is driven on after its last row.
 _AFTER = 3.0
+# What is driven without a scenario.
+_DEFAULT = f"reference: !GeneratedReference {{gait: {ANY}}}"
 _DIFFERS = (
     "loco-drake: The states differ from the recorded ones: another machine, or other "
     "versions of loco_drake and its libraries, computed them."
@@ -42,8 +44,9 @@ class Drive:
 
     # Robot: go2 or a1.
     robot: Annotated[str | None, option(metavar="STR", default="go2")] = None
-    # Gait label at the beginning, such as dog-trot.
-    gait: Annotated[str | None, option(metavar="STR", default="dog-trot")] = None
+    # Gait label at the beginning, such as dog-trot, or any: the gait then goes with the
+    # command.
+    gait: Annotated[str | None, option(metavar="STR", default="any")] = None
     # Seconds to drive. Default: until it is stopped by Ctrl-C or the page's button;
     # with --commands, 3 s after the last row; with --replay, as recorded.
     duration: float | None = None
@@ -99,7 +102,7 @@ class Drive:
             source = CommandSource(table.at)
         else:
             assert meshcat is not None
-            driver = MeshcatDriver(meshcat, LABELS, parse_label(header["gait"]))
+            driver = MeshcatDriver(meshcat, GAIT_CHOICES, header["gait"])
             source = CommandSource(driver.sample)
         scenario.plant.visual = meshcat is not None
         recorder = Recorder(scenario, meshcat, source=source, follow=True)
@@ -193,8 +196,10 @@ class Drive:
 
         if recorded is not None:
             scenario = LoadScenario(data=recorded.header["scenario"])
-        else:
+        elif self.scenario is not None:
             scenario = LoadScenario(filename=self.scenario, overlay=self.overlay)
+        else:
+            scenario = LoadScenario(data=_DEFAULT, overlay=self.overlay)
         override(scenario, robot=self.robot)
         if self.policy is not None:
             scenario.policy = TrainedPolicy(weights=self.policy)
@@ -210,10 +215,10 @@ class Drive:
             raise InputError(
                 "A scenario to drive must have steering and a trained policy."
             )
-        if str(scenario.reference.gait) not in map(str, LABELS):
+        if str(scenario.reference.gait) not in GAIT_CHOICES:
             raise InputError(
-                "A drive begins with one gait, such as dog-trot, not with a schedule; "
-                "buttons or a table of commands change it."
+                "A drive begins with one gait, such as dog-trot, or with any, not with "
+                "a schedule; buttons or a table of commands change it."
             )
         return scenario
 
@@ -236,7 +241,8 @@ class Drive:
         else:
             return None
         labels = table.rows[:, GAIT].astype(np.int64)
-        pretrained_motion_model(scenario.robot).check_labels(labels)
+        model = pretrained_motion_model(scenario.robot)
+        model.check_labels(labels[labels != ANY_INDEX])
         return table
 
     def _duration(

@@ -14,7 +14,7 @@ from loco_drake.common.rotations import yaw_of
 from loco_drake.control.driving import COMMAND, GAIT, PUSH, RESET
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.state import ORIENTATION, VELOCITY, split
-from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.gaits import ANY, ANY_INDEX
 from loco_drake.systems.meshcat_driver import MeshcatDriver, MeshcatText
 
 if TYPE_CHECKING:
@@ -105,10 +105,11 @@ class DriveView:
     def _lines(self, now: float, orders: Array) -> list[str]:
         diagram, context = self._recorder.diagram, self._recorder.context
         followed = diagram.GetOutputPort("followed").Eval(context)
+        chosen = f"{ANY}: " if orders[GAIT] == ANY_INDEX else ""
         lines = [
             f"command {_command(orders[COMMAND])}",
             f"followed {_command(followed)}",
-            f"{LABELS[int(orders[GAIT])]}  {np.mean(self._speeds):.2f} m/s  "
+            f"{chosen}{self._recorder.gait}  {np.mean(self._speeds):.2f} m/s  "
             f"return {100 * np.mean(self._rewards):.0f}  {now:.1f} s",
         ]
         notes = [] if self._driver is None else list(self._driver.notes)

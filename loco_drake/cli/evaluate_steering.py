@@ -117,7 +117,8 @@ class EvaluateSteering(SimulatedEvaluation):
         """Returns the figures of one robot."""
         if self.compare:
             return self._compared(name, scenario, courses)
-        from loco_drake.evaluation.steering_table import overall, run_courses
+        from loco_drake.evaluation.steering_overall import overall
+        from loco_drake.evaluation.steering_table import run_courses
 
         results = run_courses(scenario, courses, self.workers)
         labels = dict(tracked(results, f"Driving {name}", len(courses)))

@@ -15,7 +15,7 @@ from loco_drake.cli.simulation import (
     start_meshcat,
 )
 from loco_drake.common.errors import InputError
-from loco_drake.motion.gaits import parse_schedule
+from loco_drake.motion.gaits import ANY, parse_schedule
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.motion_file import load_motion
 
@@ -30,7 +30,8 @@ class Simulate:
     # Robot: go2 or a1.
     robot: Annotated[str | None, option(metavar="STR", default="go2")] = None
     # Gait label, such as dog-trot, or a schedule of labels with start times in s, such
-    # as dog-pace,dog-trot@3. Ignored with a Motion file.
+    # as dog-pace,dog-trot@3, or any: the gait then goes with --command. Ignored with a
+    # Motion file.
     gait: Annotated[str | None, option(metavar="STR", default="dog-trot")] = None
     # Seconds to simulate; at most the length of a Motion file.
     duration: Annotated[float | None, option(metavar="FLOAT", default="10.0")] = None
@@ -97,6 +98,8 @@ class Simulate:
             **tracking.tracking_metrics(rollout),
             "real_time_factor": simulated / wall,
         }
+        if figures["gait"] == ANY:
+            figures["chosen"] = str(recorder.gait)
         if meshcat is not None:
             meshcat.StopRecording()
             meshcat.PublishRecording()
@@ -154,7 +157,13 @@ class Simulate:
         if not isinstance(scenario.policy, TrainedPolicy):
             raise InputError("The policy of a scenario to simulate must be trained.")
         if isinstance(reference, GeneratedReference):
-            parse_schedule(reference.gait).check_ends_by(duration)
+            if reference.gait != ANY:
+                parse_schedule(reference.gait).check_ends_by(duration)
+            elif self.command is None:
+                raise InputError(
+                    "The gait any is chosen by the command: add --command, or name a "
+                    "gait, such as dog-trot."
+                )
             return scenario, duration, None
         if not isinstance(reference, MotionReference):
             raise InputError(

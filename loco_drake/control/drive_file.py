@@ -19,7 +19,7 @@ from loco_drake.control.driving import (
     check_orders,
     order_table,
 )
-from loco_drake.motion.gaits import LABELS
+from loco_drake.motion.gaits import gait_name
 
 _KIND = "loco_drake drive"
 _SCHEMA_VERSION = 1
@@ -55,7 +55,7 @@ def save_drive(path: Path, table: OrderTable, **header: Any) -> None:
     lines = []
     for time, row in zip(table.times, table.rows, strict=True):
         orders: list[Any] = [float(value) for value in row]
-        orders[GAIT] = str(LABELS[int(row[GAIT])])
+        orders[GAIT] = gait_name(int(row[GAIT]))
         lines.append(json.dumps([float(time), *orders]))
     content = "\n".join(lines)
     full = {

@@ -1,9 +1,9 @@
 """Orders to a robot over time: what a driver's hands or a table say.
 
 The orders of one moment are a row of ORDERS numbers: the command (forward and sideways
-m/s, yaw rate rad/s, in the heading frame), the gait's index in LABELS, and two things
-that happen in one control period only: a push of the trunk to its left, N s, and a
-reset, 1 or 0.
+m/s, yaw rate rad/s, in the heading frame), the gait's index in LABELS or ANY_INDEX, and
+two things that happen in one control period only: a push of the trunk to its left, N s,
+and a reset, 1 or 0.
 """
 
 import csv
@@ -20,7 +20,7 @@ from loco_drake.common.errors import InputError, check_number, quoted
 from loco_drake.common.files import parse_number, read_text
 from loco_drake.control.command import ANY_COMMAND
 from loco_drake.control.plan import PLAN_DT
-from loco_drake.motion.gaits import LABELS, parse_label
+from loco_drake.motion.gaits import gait_index
 
 COMMAND = np.s_[..., :3]
 GAIT, PUSH, RESET = 3, 4, 5
@@ -83,8 +83,7 @@ def check_orders(values: Sequence[float | str]) -> Array:
     check_number("A push", push, -MOST_PUSH, MOST_PUSH)
     if reset not in (0, 1):
         raise InputError(f"A reset must be 0 or 1, not {quoted(reset)}.")
-    label = LABELS.index(parse_label(str(gait)))
-    return np.array([*command, label, push, reset], dtype=np.float64)
+    return np.array([*command, gait_index(str(gait)), push, reset], dtype=np.float64)
 
 
 def order_table(times: Sequence[float], rows: Sequence[Array]) -> OrderTable:

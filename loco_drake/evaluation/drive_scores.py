@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from loco_drake.common.arrays import Array
-from loco_drake.control.driving import COMMAND, GAIT, RESET, OrderTable
+from loco_drake.control.driving import COMMAND, RESET, OrderTable
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.evaluation.driving import Driven
 from loco_drake.evaluation.steering import rmse, robot_latency, stride_velocity
@@ -32,7 +32,7 @@ def drive_scores(robot: Robot, driven: Driven) -> dict[str, float | None]:
     samples = np.arange(len(state))
     commands = table.rows[table.index(PLAN_DT * samples.astype(float))][COMMAND]
     velocity = np.full((len(state), 3), np.nan)
-    for first, end in _pieces(table, len(state)):
+    for first, end in _pieces(driven, len(state)):
         velocity[first:end] = stride_velocity(robot, state[first:end])
     counted = np.isfinite(velocity[:, 0]) & ~np.isin(samples, driven.lying)
     velocity_rmse, yaw_rate_rmse = (
@@ -52,10 +52,11 @@ def drive_scores(robot: Robot, driven: Driven) -> dict[str, float | None]:
     }
 
 
-def _pieces(table: OrderTable, samples: int) -> Iterator[tuple[int, int]]:
+def _pieces(driven: Driven, samples: int) -> Iterator[tuple[int, int]]:
     """Yields first and last sample (exclusive) of the pieces of 2 samples or more."""
+    table = driven.table
     at = np.round(table.times / PLAN_DT).astype(int)
-    gaits = at[1:][np.diff(table.rows[:, GAIT]) != 0]
+    gaits = 1 + np.flatnonzero(np.diff(driven.gaits))
     # The robot is put upright after the sample that ends the control period.
     upright = at[table.rows[:, RESET] == 1] + 2
     minutes = np.arange(0, samples, round(_LONGEST / PLAN_DT))

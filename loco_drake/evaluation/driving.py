@@ -30,6 +30,8 @@ class Driven:
     table: OrderTable  # the orders in every control period
     falls: int
     lying: Integers  # samples at which the robot lies
+    # Index into LABELS of the gait that was asked for or chosen in each control period.
+    gaits: Integers
     # Seconds from a change of the command to the first sample of the plan that differs.
     latencies: list[float]
     wall: float  # seconds inside AdvanceTo
@@ -58,6 +60,9 @@ def drive(
     times: list[float] = []
     rows: list[Array] = []
     lying: list[int] = []
+    gaits: list[float] = []
+    selector = diagram.GetSubsystemByName("gait_selector")
+    gait = selector.GetOutputPort("gait")
     latencies = _Latencies(recorder)
     wall, done, falls = 0.0, 0, 0
     lies, goes_on = False, True
@@ -67,6 +72,7 @@ def drive(
         wall += time.perf_counter() - start
         orders = source.orders(source_context)
         latencies.update(done * PLAN_DT, orders[COMMAND])
+        gaits.append(gait.Eval(selector.GetMyContextFromRoot(context))[0])
         acts = orders[PUSH] != 0 or orders[RESET] != 0
         if not rows or acts or (orders[:PUSH] != rows[-1][:PUSH]).any():
             times.append(done * PLAN_DT)
@@ -91,6 +97,7 @@ def drive(
         order_table(times, rows),
         falls,
         np.array(lying, dtype=np.int64),
+        np.array(gaits, dtype=np.int64),
         latencies.found,
         wall,
     )

@@ -1,20 +1,24 @@
 """The commands by which steering is measured, and what came of one."""
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from loco_drake.common.arrays import Array
-from loco_drake.control.command import CommandRange
+from loco_drake.control.command import ANY_COMMAND, CommandRange
 from loco_drake.evaluation.steering import rmse
+from loco_drake.motion.gaits import parse_label
 
 VELOCITY_GOAL, YAW_RATE_GOAL = 0.11, 0.12  # m/s, rad/s
 DISTANCE_GOAL = 0.5  # m, largest distance of the robot from its plan
 
 # At least so much of an axis is worth a point, m/s or rad/s.
 LEAST = 0.02
+
+# Gaits to change to: by diagonal pairs, by front and rear pairs, one foot at a time.
+_OTHERS = ("dog-trot", "mpc-bound", "horse-walk")
 
 
 @dataclass(frozen=True)
@@ -96,3 +100,20 @@ def steps(within: CommandRange) -> Iterator[tuple[Array, Array]]:
         if abs(there[axis] - middle[axis]) >= LEAST:
             yield middle, there
             yield there, middle
+
+
+def gait_changes(
+    label: str, within: CommandRange, published: Mapping[int, CommandRange]
+) -> Iterator[tuple[int, Array]]:
+    """Yields gait, an index into LABELS, and command of each part of a drive.
+
+    It leads to other gaits and back, at the middle of the label's range, or as much of
+    that as the range of each other gait holds.
+    """
+    own = parse_label(label).index
+    yield own, within.middle
+    for other in map(parse_label, _OTHERS):
+        if other.index != own:
+            theirs = published.get(other.index, ANY_COMMAND)
+            yield other.index, theirs.clip(within.middle)
+            yield own, within.middle

@@ -11,6 +11,9 @@ A label's figures are those of :mod:`loco_drake.evaluation.steering`:
   others at the middle, and the eight corners; 6 s each, of which the last 4 s count.
 * *Steps* go from the middle of the range to both ends of the forward velocity and of
   the yaw rate, and back.
+* *Changes* of gait lead to three gaits with other footfalls and back, every 5 s, at the
+  middle of the range or what each gait's published range holds of it; see
+  :mod:`loco_drake.evaluation.gait_change_time`.
 * *Drives* are 60 s of commands drawn within the range, another every 2 s.
 """
 
@@ -26,6 +29,7 @@ from loco_drake.common.parallel import map_in_workers
 from loco_drake.control.command import CommandRange
 from loco_drake.control.ground_path import ground_pose, path_velocity
 from loco_drake.control.plan import PLAN_DT, Plan
+from loco_drake.evaluation.gait_change_time import gait_change_figures
 from loco_drake.evaluation.motion_scores import median
 from loco_drake.evaluation.steering import (
     distance_from_plan,
@@ -38,6 +42,7 @@ from loco_drake.evaluation.steering_courses import (
     DISTANCE_GOAL,
     Course,
     Point,
+    gait_changes,
     grid,
     keeps_goals,
     steps,
@@ -52,6 +57,7 @@ from loco_drake.evaluation.tracking import (
 )
 from loco_drake.models.plant import plant_damping
 from loco_drake.models.robots import get_robot
+from loco_drake.motion.gaits import parse_label
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.quality import (
     joint_limit_violations,
@@ -59,9 +65,11 @@ from loco_drake.motion.quality import (
     stance_slip_speeds,
 )
 from loco_drake.systems.scenario import Scenario
+from loco_drake.systems.steering import command_ranges
 
 POINT, SETTLING = 6.0, 2.0  # s of a point, and of those that do not count
 _DRIVE, _CHANGE = 60.0, 2.0  # s
+_GAIT_CHANGE = 5.0  # s
 # Points of the search, m/s and rad/s; sideways and turning are tried to both sides.
 _FORWARD_STEP = 0.25
 _SIDES = ((1, (0.1, 0.2, 0.3, 0.4)), (2, (0.25, 0.5, 0.75, 1.0, 1.25)))
@@ -87,6 +95,8 @@ class Driver:
         self._recorder = Recorder(scenario)
         self._command = self._recorder.diagram.GetInputPort("command")
         self._plan = self._recorder.diagram.GetOutputPort("plan")
+        self._gait = self._recorder.diagram.GetInputPort("gait")
+        self._published = command_ranges(self.robot)
 
     def __call__(self, course: Course) -> dict[str, Any]:
         """Returns the figures of a course."""
@@ -111,6 +121,7 @@ class Driver:
                 for p in points
             ],
             **self._steps(course.label, within, seed),
+            **self._changes(course.label, within, seed),
             **self._drives(course.label, within, course.seeds),
         }
 
@@ -184,13 +195,19 @@ class Driver:
         duration: float,
         command: Callable[[int], Array],
         plans: list[Plan] | None = None,
+        gait: Callable[[int], int] | None = None,
     ) -> Rollout:
-        """Simulates a command that is a function of the sample."""
+        """Simulates a command, and a gait, that are functions of the sample."""
+        context, own = self._recorder.context, parse_label(label).index
+        # That of the last run would remain.
+        self._gait.FixValue(context, float(own))
         self._recorder.start(gait=label, seed=seed)
-        context = self._recorder.context
 
         def after_step(time: float) -> None:
-            self._command.FixValue(context, command(round(time / PLAN_DT)))
+            sample = round(time / PLAN_DT)
+            self._command.FixValue(context, command(sample))
+            if gait is not None:
+                self._gait.FixValue(context, float(gait(sample)))
             if plans is not None:
                 plans.append(self._plan.Eval(context))
 
@@ -235,6 +252,24 @@ class Driver:
             "steps_covered": len(known),
         }
 
+    def _changes(self, label: str, within: CommandRange, seed: int) -> dict[str, Any]:
+        """Changes from a gait to others and back, in one drive."""
+        gaits, commands = zip(
+            *gait_changes(label, within, self._published), strict=True
+        )
+        period = round(_GAIT_CHANGE / PLAN_DT)
+        plans: list[Plan] = []
+        rollout = self.run(
+            label,
+            seed,
+            len(gaits) * _GAIT_CHANGE,
+            partial(_from_table, commands, period=period),
+            plans,
+            partial(_from_table, gaits, period=period),
+        )
+        played = np.array([p.labels[p.index(k * PLAN_DT)] for k, p in enumerate(plans)])
+        return gait_change_figures(self.robot, rollout.state, played, commands, period)
+
     def _drives(
         self, label: str, within: CommandRange, seeds: Sequence[int]
     ) -> dict[str, Any]:
@@ -245,7 +280,7 @@ class Driver:
                 within.low, within.high, (round(_DRIVE / _CHANGE) + 1, 3)
             )
             plans: list[Plan] = []
-            command = partial(_from_table, table, round(_CHANGE / PLAN_DT))
+            command = partial(_from_table, table, period=round(_CHANGE / PLAN_DT))
             rollout = self.run(label, seed, _DRIVE, command, plans)
             drives.append((rollout, plans))
         p_WF = [
@@ -280,9 +315,8 @@ def _step(before: Array, after: Array, changed: int, sample: int) -> Array:
     return before if sample < changed else after
 
 
-def _from_table(table: Array, period: int, sample: int) -> Array:
-    row: Array = table[sample // period]
-    return row
+def _from_table(table: Sequence[Any] | Array, sample: int, *, period: int) -> Any:
+    return table[min(sample // period, len(table) - 1)]
 
 
 def run_courses(
@@ -291,31 +325,3 @@ def run_courses(
     """Yields label and figures of each course, in order."""
     results = map_in_workers(partial(Driver, scenario), courses, workers)
     return zip((course.label for course in courses), results, strict=True)
-
-
-def overall(labels: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Returns the figures of all labels together."""
-
-    def of(name: str) -> list[float]:
-        return [f[name] for f in labels.values() if f[name] is not None]
-
-    known = [f for f in labels.values() if f["velocity_rmse_mps"] is not None]
-    weights = [len(f["points"]) for f in known]
-    result: dict[str, Any] = {
-        name: float(np.sqrt(np.average(np.square(of(name)), weights=weights)))
-        if known
-        else None
-        for name in ("velocity_rmse_mps", "yaw_rate_rmse_radps")
-    }
-    for name in (
-        "latency_reference_s",
-        "distance_from_plan_max_m",
-        "plan_penetration_max_m",
-    ):
-        result[name] = max(of(name), default=None)
-    for name in ("latency_robot_s", "plan_slip_median_mps", "stance_slip_median_mps"):
-        result[name] = float(np.median(of(name))) if of(name) else None
-    for name in ("fall_rate", "normalized_return", "stretch"):
-        result[name] = float(np.mean(of(name)))
-    result["plan_joint_limit_violations"] = sum(of("plan_joint_limit_violations"))
-    return result

@@ -36,6 +36,7 @@ from loco_drake.control.state import (
     unit_base,
 )
 from loco_drake.models.robots import Robot
+from loco_drake.motion.gaits import ROW_LABELS, GaitLabel
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.quality import stance_slip_speeds
 from loco_drake.systems.command_source import CommandSource
@@ -110,6 +111,12 @@ class Recorder:
     def context(self) -> Context:
         """The diagram's context."""
         return self.simulator.get_mutable_context()
+
+    @property
+    def gait(self) -> GaitLabel:
+        """The gait of the plan that is tracked, at present."""
+        plan = self.diagram.GetOutputPort("plan").Eval(self.context)
+        return ROW_LABELS[plan.labels[plan.index(self.context.get_time())]]
 
     def start(self, **episode: Any) -> None:
         """Starts an episode and clears the logs, see :func:`StartEpisode`."""

@@ -15,6 +15,10 @@ from loco_drake.common.errors import InputError, check_choice, check_name
 SOURCES = ("dog", "horse", "mpc", "solo8")
 GAITS = ("pace", "trot", "gallop", "walk", "bound", "crawl", "stilt", "wave")
 OTHER = "other"
+# What an order for a gait may be instead of a label: the command chooses one, see
+# control.gait_choice. The index of it is in the place of one into LABELS.
+ANY = "any"
+ANY_INDEX = -1
 _SYNTAX = "such as dog-pace,dog-trot@3,dog-gallop@6"
 
 
@@ -94,6 +98,25 @@ def parse_label(text: str) -> GaitLabel:
     """
     names = [str(label) for label in LABELS]
     return LABELS[names.index(check_choice("gait", text, names))]
+
+
+# Texts of the orders for a gait.
+GAIT_CHOICES = (ANY, *map(str, LABELS))
+
+
+def gait_index(text: str) -> int:
+    """Returns the index into LABELS of a label, or ANY_INDEX of ANY.
+
+    Raises:
+        InputError: if ``text`` is neither.
+    """
+    check_choice("gait", text, GAIT_CHOICES)
+    return ANY_INDEX if text == ANY else GAIT_CHOICES.index(text) - 1
+
+
+def gait_name(index: int) -> str:
+    """Returns the text of which :func:`gait_index` makes ``index``."""
+    return ANY if index == ANY_INDEX else str(LABELS[index])
 
 
 @dataclass(frozen=True)

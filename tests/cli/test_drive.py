@@ -3,13 +3,19 @@ by hand.
 """
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from loco_drake.cli import drive_view
 from loco_drake.cli.main import main
 from loco_drake.control.actor import Actor, ActorConfig, save_actor
 from loco_drake.control.drive_file import load_drive
+from loco_drake.control.gait_choice import PAUSE, Choice, next_choice
+from loco_drake.models.robots import get_robot
+from loco_drake.motion.gaits import LABELS
+from loco_drake.systems.gait_selector import measured_gaits
 
 TABLE = """time,forward,sideways,yaw_rate,gait,push,reset
 0,0.6,0,0,,,
@@ -38,7 +44,8 @@ def recorded(weights, tmp_path_factory):
     (folder / "commands.csv").write_text(TABLE)
     line = ("--commands", folder / "commands.csv", "--duration", 1.6)
     policy = ("--policy", weights / "calm.safetensors", "--seed", 3)
-    figures = drive(folder, *line, *policy, "--record", folder / "a.drive")
+    gait = ("--gait", "dog-trot")
+    figures = drive(folder, *line, *policy, *gait, "--record", folder / "a.drive")
     return folder, figures
 
 
@@ -103,7 +110,7 @@ def test_each_order_changes_the_states(recorded, weights, tmp_path):
         policy = ("--policy", weights / "calm.safetensors", "--seed", 3)
         record = tmp_path / "a.drive"
         line = ("--commands", table, "--duration", 1.6, "--record", record)
-        drive(tmp_path, *line, *policy)
+        drive(tmp_path, *line, *policy, "--gait", "dog-trot")
         hashes.add(load_drive(record).header["states_sha256"])
     hashes.add(load_drive(folder / "a.drive").header["states_sha256"])
     assert len(hashes) == 5
@@ -126,7 +133,7 @@ def test_a_constant_command_is_that_of_simulate(weights, tmp_path):
     table = tmp_path / "commands.csv"
     table.write_text("time,forward,sideways,yaw_rate\n0,0.5,0.1,0.4\n")
     line = ("--policy", str(weights / "calm.safetensors"), "--duration", "1.0")
-    overlay = "reference: !GeneratedReference {duration: 1.0}"
+    overlay = "reference: !GeneratedReference {duration: 1.0, gait: dog-trot}"
     driven = drive(tmp_path, "--commands", table, *line, "--overlay", overlay)
     path = str(tmp_path / "simulated.json")
     command = ("--command", "0.5", "0.1", "0.4", "--no-meshcat", "--json", path)
@@ -158,13 +165,70 @@ def test_a_table_is_driven_on_for_three_seconds(weights, tmp_path):
     assert drive(tmp_path, *line)["simulated_s"] == 3.2
 
 
+def chosen(*speeds):
+    """Returns the gaits of forward velocities that follow one another, as a drive's."""
+    gaits, choice, labels = measured_gaits(get_robot("go2")), Choice(-1), []
+    for k, speed in enumerate(speeds):
+        choice = next_choice(gaits, np.array([speed, 0.0, 0.0]), choice, k * PAUSE)
+        labels.append(str(LABELS[choice.label]))
+    return labels
+
+
+def test_the_commands_choose_the_gait_unless_one_is_named(weights, tmp_path):
+    """From the beginning on; and a record of it is repeated to the last bit."""
+    table, record = tmp_path / "commands.csv", tmp_path / "a.drive"
+    head = "time,forward,sideways,yaw_rate,gait\n"
+    table.write_text(f"{head}0,0.1,0,0,\n0.4,1.8,0,0,\n1.5,0.5,0,0,dog-pace\n")
+    line = ("--commands", table, "--policy", weights / "calm.safetensors")
+    figures = drive(tmp_path, *line, "--duration", 2, "--record", record)
+    assert figures["gait"] == "any"
+    np.testing.assert_array_equal(load_drive(record).table.rows[:, 3], [-1, -1, 0])
+    assert drive(tmp_path, "--replay", record)["identical"] is True
+    hashes = {load_drive(record).header["states_sha256"]}
+    for gait in chosen(0.1, 1.8):
+        drive(tmp_path, *line, "--duration", 2, "--record", record, "--gait", gait)
+        hashes.add(load_drive(record).header["states_sha256"])
+    assert len(hashes) == 3
+
+
+class Screen:
+    """Stands for the line in a terminal."""
+
+    def __init__(self, shown):
+        self.shown = shown
+        self.start = self.stop = lambda: None
+
+    def update(self, text, *, refresh):
+        self.shown.append(text.plain)
+
+
+def test_the_line_shows_the_gait_that_is_walked(weights, tmp_path, monkeypatch):
+    shown = []
+    monkeypatch.setattr(drive_view, "Live", lambda *a, **options: Screen(shown))
+    terminal = SimpleNamespace(is_terminal=True)
+    monkeypatch.setattr(drive_view, "Console", lambda stderr: terminal)
+    table = tmp_path / "commands.csv"
+    head = "time,forward,sideways,yaw_rate,gait\n"
+    table.write_text(f"{head}0,0.1,0,0,any\n0.7,1.8,0,0,\n1.7,0.5,0,0,dog-pace\n")
+    line = ("--commands", table, "--policy", weights / "calm.safetensors")
+    drive(tmp_path, *line, "--duration", 3)
+    gaits = [line.split("  |  ")[2].split("  ")[0] for line in shown]
+    # Twice a second. The order counts at once, the gait when its plan is played.
+    slow, fast = chosen(0.1, 1.8)
+    expected = [slow, slow, fast, fast, "dog-pace", "dog-pace"]
+    assert gaits == [f"any: {gait}" for gait in expected[:3]] + expected[3:]
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         ("", "add --commands or --replay"),
         ("--commands none.csv", "There is no file 'none.csv'"),
         ("--commands words.csv", "its first line must name the columns"),
-        ("--commands good.csv --gait dog-fly", "Unknown gait 'dog-fly'"),
+        (
+            "--commands good.csv --gait dog-fly",
+            "Unknown gait 'dog-fly'; the choices are any, dog-pace",
+        ),
         ("--commands good.csv --gait dog-pace,dog-trot@3", "not with a schedule"),
         ("--commands good.csv --robot spot", "Unknown robot 'spot'"),
         ("--commands good.csv --duration 0", "The duration must be above 0"),
@@ -210,7 +274,11 @@ def test_wrong_input_is_one_sentence_and_status_2(
 @pytest.mark.parametrize(
     ("overlay", "message"),
     [
-        ("steering: null", "must have steering and a trained policy"),
+        ("steering: null", "The gait any needs steering"),
+        (
+            "{steering: null, reference: !GeneratedReference {gait: dog-trot}}",
+            "must have steering and a trained policy",
+        ),
         ("policy: !ExternalAction {}", "must have steering and a trained policy"),
         ("reference: !PlanReference {}", "must be generated"),
     ],

@@ -52,7 +52,8 @@ def drive(tmp_path):
 def test_keys_in_a_browser_drive_the_robot_and_the_page_shows_it(drive, tmp_path):
     # Without a graphics card drawing takes all of a machine's time.
     few = ("--overlay", "visualization: {publish_period: 0.125}")
-    process, address = drive("--record", "a.drive", "--json", "a.json", *few)
+    files = ("--record", "a.drive", "--json", "a.json")
+    process, address = drive(*files, "--gait", "dog-trot", *few)
     with Browser(find_browser(), tmp_path / "profile", (320, 240)) as browser:
         browser.open(address)
         browser.wait_for(f"globalThis.viewer?.gui_controllers[{FORWARD!r}] != null")
@@ -80,6 +81,8 @@ def test_keys_in_a_browser_drive_the_robot_and_the_page_shows_it(drive, tmp_path
         browser.press("KeyR")
         browser.press("KeyX")
         browser.wait_for(f"{SHOWN}?.includes('dog-trot')")
+        browser.press("KeyZ", 2)
+        browser.wait_for(f"{SHOWN}?.includes('any: ')")
         browser.press("Escape")
         printed, error = process.communicate(timeout=LIMIT)
     assert process.returncode == 0, error
@@ -89,8 +92,9 @@ def test_keys_in_a_browser_drive_the_robot_and_the_page_shows_it(drive, tmp_path
         assert value in rows[:, column]
     assert rows[:, 0].max() == 2.0
     np.testing.assert_array_equal(rows[0], [0, 0, 0, 1, 0, 0])
-    # Pace, and trot again.
-    assert set(rows[:, 3]) == {0, 1}
+    # Pace, trot again, and at last any.
+    assert {-1, 0, 1} == set(rows[:, 3])
+    assert rows[-1, 3] == -1
     assert (rows[:, 4].max(), rows[:, 5].max()) == (6.0, 1.0)
     figures = json.loads((tmp_path / "a.json").read_text())
     assert 0.02 < figures["speed_mps"] < 2.0

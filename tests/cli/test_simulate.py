@@ -2,10 +2,15 @@ import json
 import re
 import socket
 
+import numpy as np
 import pytest
 
 from loco_drake.cli.main import main
+from loco_drake.control.gait_choice import best_gait
+from loco_drake.models.robots import get_robot
+from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion_file import save_motion
+from loco_drake.systems.gait_selector import measured_gaits
 from tests.synthetic_motion import synthetic_motion
 
 KEYS = {
@@ -189,6 +194,28 @@ def test_a_constant_command_is_followed(weights, tmp_path):
     free = simulate(tmp_path, *line)
     slow = simulate(tmp_path, *line, "--command", 0.4, 0.0, 0.0)
     assert 0.2 < slow["speed_mps"] < 0.6 < free["speed_mps"]
+
+
+def test_a_command_chooses_any_gait(weights, tmp_path):
+    """The run is that of the gait itself, to the last bit."""
+    gaits = measured_gaits(get_robot("go2"))
+    line = ("--duration", 1, "--no-meshcat", "--policy", weights / "calm.safetensors")
+    for speed in (0.1, 1.5):
+        command = ("--command", speed, 0.0, 0.0)
+        gait = str(LABELS[best_gait(gaits, np.array([speed, 0.0, 0.0]))])
+        chosen = simulate(tmp_path, *line, *command, "--gait", "any")
+        assert (chosen.pop("gait"), chosen.pop("chosen")) == ("any", gait)
+        named = simulate(tmp_path, *line, *command, "--gait", gait)
+        assert named.pop("gait") == gait
+        del named["real_time_factor"], chosen["real_time_factor"]
+        assert named == chosen
+
+
+def test_any_gait_needs_a_command(capsys):
+    assert main(["simulate", "--no-meshcat", "--gait", "any"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "The gait any is chosen by the command: add --command" in error
 
 
 @pytest.mark.parametrize(

@@ -45,6 +45,12 @@ def test_a_command_lasts_until_the_next_row_and_a_push_for_one_period(write):
     np.testing.assert_array_equal(orders[54], [0, 0, 0, 0, 0, 0])
 
 
+def test_a_table_may_ask_for_any_gait(write):
+    table = read_commands(write(TABLE.replace("dog-pace", "any")), "dog-trot")
+    assert [table.at(time)[GAIT] for time in (0.5, 1.0, 2.0)] == [1, -1, -1]
+    assert read_commands(write(TABLE), "any").at(0.5)[GAIT] == -1
+
+
 def test_pushes_of_one_period_add_up():
     rows = np.zeros((3, 6))
     rows[1:, PUSH] = 2.0, 3.0
@@ -93,7 +99,10 @@ HEAD = "time,forward,sideways,yaw_rate"
         (f"{HEAD}\n2,0,0,0\n2,0,0,0\n", "line 3: .* must rise"),
         (f"{HEAD}\n0,0,0,{'9' * 200_000}\n", "is no table of commands: field larger"),
         (f"{HEAD}\n\n,,,\n", "is no table of commands: it lists none"),
-        (f"{HEAD},gait\n0,0,0,0,fly\n", "line 2: Unknown gait 'fly'"),
+        (
+            f"{HEAD},gait\n0,0,0,0,fly\n",
+            "Unknown gait 'fly'; the choices are any, dog-pace",
+        ),
         (f"{HEAD},push\n0,0,0,0,1e9\n", "line 2: A push must be a number from -100"),
         (f"{HEAD},reset\n0,0,0,0,2\n", "line 2: A reset must be 0 or 1"),
     ],

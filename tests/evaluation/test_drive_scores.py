@@ -28,6 +28,7 @@ def driven(state, rows, lying=(), latencies=()):
         OrderTable(table[:, 0], table[:, 1:]),
         len(lying) > 0,
         np.array(lying, dtype=np.int64),
+        np.array([table[table[:, 0] <= PLAN_DT * k, 4][-1] for k in range(n)], int),
         list(latencies),
         1.0,
     )

@@ -13,8 +13,14 @@ from loco_drake.evaluation.steering import (
     stride_of,
     stride_velocity,
 )
-from loco_drake.evaluation.steering_courses import axis_points, grid, steps
-from loco_drake.evaluation.steering_table import overall
+from loco_drake.evaluation.steering_courses import (
+    axis_points,
+    gait_changes,
+    grid,
+    steps,
+)
+from loco_drake.evaluation.steering_overall import overall
+from loco_drake.motion.gaits import parse_label
 from tests.synthetic_motion import synthetic_motion
 
 BOX = CommandRange((-0.5, -0.3, -1.0), (2.0, 0.3, 1.0))
@@ -114,6 +120,17 @@ def test_steps_go_to_both_ends_of_speed_and_turning_and_back():
     assert pairs == [p for e in ends for p in ((middle, e), (e, middle))]
 
 
+def test_changes_of_gait_lead_there_and_back_at_a_pace_that_each_can():
+    slow = CommandRange((0.0, 0.0, 0.0), (0.5, 0.0, 0.0))
+    walk, bound = parse_label("horse-walk").index, parse_label("mpc-bound").index
+    parts = list(gait_changes("dog-trot", BOX, {walk: slow}))
+    trot = parse_label("dog-trot").index
+    assert [gait for gait, _ in parts] == [trot, bound, trot, walk, trot]
+    speeds = [command.tolist() for _, command in parts]
+    assert speeds == [[s, 0.0, 0.0] for s in (0.75, 0.75, 0.75, 0.5, 0.75)]
+    assert len(list(gait_changes("dog-pace", BOX, {}))) == 7
+
+
 def test_a_range_is_clipped_scaled_and_written():
     np.testing.assert_array_equal(BOX.clip(np.array([3.0, 0.1, -9])), [2.0, 0.1, -1])
     half = BOX.scaled((0.5, 0.5, 0.25))
@@ -132,6 +149,8 @@ def test_all_labels_together_weigh_their_points():
             "points": [None] * points,
             "latency_reference_s": latency,
             "latency_robot_s": latency,
+            "gait_change_s": latency,
+            "gait_change_max_s": 2 * latency,
             "distance_from_plan_max_m": latency,
             "plan_penetration_max_m": 0.0,
             "plan_slip_median_mps": 0.0,
@@ -146,5 +165,7 @@ def test_all_labels_together_weigh_their_points():
     assert figures["velocity_rmse_mps"] == pytest.approx(np.sqrt(0.03))
     assert figures["latency_reference_s"] == 0.4
     assert figures["latency_robot_s"] == pytest.approx(0.3)
+    assert figures["gait_change_s"] == pytest.approx(0.3)
+    assert figures["gait_change_max_s"] == 0.8
     assert figures["stance_slip_median_mps"] is None
     assert figures["plan_joint_limit_violations"] == 2

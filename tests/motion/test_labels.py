@@ -5,11 +5,14 @@ import pytest
 
 from loco_drake.common.errors import InputError
 from loco_drake.motion.gaits import (
+    ANY_INDEX,
     GAITS,
     LABELS,
     ONE_HOT,
     SOURCES,
     GaitLabel,
+    gait_index,
+    gait_name,
     parse_label,
 )
 from loco_drake.motion.keypoints import KeypointClip
@@ -27,6 +30,14 @@ def test_labels_are_written_and_read():
         assert label.index == i
     with pytest.raises(InputError, match=r"'dog-waltz'; the choices are dog-pace, dog"):
         parse_label("dog-waltz")
+
+
+def test_a_gait_to_be_walked_may_be_any():
+    for index in (ANY_INDEX, *range(len(LABELS))):
+        assert gait_index(gait_name(index)) == index
+    assert (gait_name(ANY_INDEX), gait_name(1)) == ("any", "dog-trot")
+    with pytest.raises(InputError, match=r"'all'; the choices are any, dog-pace, dog"):
+        gait_index("all")
 
 
 def test_one_hots_are_two():

@@ -3,7 +3,7 @@ import pytest
 from pydrake.geometry import Meshcat
 
 from loco_drake.control.driving import COMMAND, GAIT, PUSH, RESET
-from loco_drake.motion.gaits import LABELS, parse_label
+from loco_drake.motion.gaits import GAIT_CHOICES, gait_name
 from loco_drake.systems.meshcat_driver import (
     HALT,
     PUSHES,
@@ -45,7 +45,7 @@ def meshcat(server):
 
 @pytest.fixture
 def driver(meshcat):
-    return MeshcatDriver(meshcat, LABELS, parse_label("dog-trot"))
+    return MeshcatDriver(meshcat, GAIT_CHOICES, "dog-trot")
 
 
 def test_at_first_the_robot_stays_with_its_gait(driver):
@@ -69,7 +69,7 @@ def test_buttons_are_pressed_once(meshcat, driver):
     click(meshcat, RESET_BUTTON)
     click(meshcat, "Push right (arrow)")
     orders = driver.sample(0.1)
-    assert LABELS[int(orders[GAIT])] == parse_label("horse-walk")
+    assert gait_name(int(orders[GAIT])) == "horse-walk"
     assert (orders[PUSH], orders[RESET]) == (PUSHES["Push right (arrow)"], 1)
     later = driver.sample(0.12)
     assert later[GAIT] == orders[GAIT]
@@ -88,15 +88,16 @@ def test_a_key_that_is_held_pushes_twice_a_second(meshcat, driver):
 
 
 def test_gaits_have_buttons_and_two_keys_go_through_them(meshcat, driver):
-    assert set(map(str, LABELS)) <= set(meshcat.GetButtonNames())
+    assert set(GAIT_CHOICES) <= set(meshcat.GetButtonNames())
     gaits = []
-    for name in 2 * ["Previous gait (Z)"] + 3 * ["Next gait (X)"]:
+    for name in 3 * ["Previous gait (Z)"] + 4 * ["Next gait (X)"]:
         click(meshcat, name)
         gaits.append(int(driver.sample(0.1)[GAIT]))
-    # From the second, dog-trot, and round.
-    assert gaits == [0, 14, 0, 1, 2]
-    click(meshcat, "solo8-wave")
-    assert driver.sample(0.2)[GAIT] == 14
+    # From the second label, dog-trot, and round by way of any.
+    assert gaits == [0, -1, 14, -1, 0, 1, 2]
+    for name, index in (("solo8-wave", 14), ("any", -1)):
+        click(meshcat, name)
+        assert driver.sample(0.2)[GAIT] == index
 
 
 def test_a_stick_commands_in_proportion_and_adds_to_the_sliders(meshcat, driver):

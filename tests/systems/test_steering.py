@@ -54,6 +54,12 @@ def build(robot, reference, limits=None, steering=True, **options):
     return builder.Build()
 
 
+def is_slow(plan):
+    """Whether TOPP-RA has slowed a plan down by 3 %."""
+    written = plan.path_time[-1] - plan.path_time[0]
+    return written < 0.97 * (plan.end_time - plan.start_time)
+
+
 @pytest.fixture(scope="module")
 def model():
     return make_tiny_model()
@@ -147,9 +153,7 @@ def test_the_first_sample_that_differs_is_due_within_three_tenths(go2, long_trot
     diagram = build(go2, PlanPlayer(go2, long_trot), limits)
     ours, plans = run(diagram, [(0.0, [0.6, 0.0, 0.0])], 2.5)
     if slow:
-        assert plans[-1].path_time[-1] - plans[-1].path_time[0] < 0.97 * (
-            plans[-1].end_time - plans[-1].start_time
-        )
+        assert is_slow(plans[-1])
     # At any phase of the updates.
     for late in range(4):
         time = STEP + late * PLAN_DT
@@ -180,16 +184,22 @@ def test_what_is_played_is_smooth(played, long_trot):
     assert jolt < 25.0  # m/s^2; a change of .6 m/s within .6 s
 
 
-def test_another_gait_is_written_from_the_next_tokens_on(go2, model):
+@pytest.mark.parametrize("slow", [False, True])
+def test_another_gait_is_written_from_the_next_tokens_on(go2, model, slow):
+    """Also while TOPP-RA is slowing the plan."""
     pace = GeneratedReference(gait="dog-pace")
-    diagram = build(go2, ReferenceGenerator(go2, pace, model))
+    limits = tight(go2) if slow else path_limits(go2)
+    diagram = build(go2, ReferenceGenerator(go2, pace, model), limits)
     q, plans = run(diagram, [], 3.0, gaits=[(0.0, 0.0), (STEP, 1.0)])
     labels = np.array(
         [p.labels[round(k - p.start_time * 50)] for k, p in enumerate(plans)]
     )
     first = np.flatnonzero(labels == 1)[0] * PLAN_DT
-    # Three updates, one token of .08 s and a frame.
-    assert STEP + 0.2 < first <= STEP + 0.55
+    # Three updates, one token of .08 s and a frame; of the plan, .1 s and the token,
+    # which last seven times as long where it is slowed so much.
+    assert STEP + 0.2 < first <= STEP + (1.6 if slow else 0.55)
+    if slow:
+        assert is_slow(plans[-1])
     assert (labels[round(first / PLAN_DT) :] == 1).all()
     # It is the same motion up to there, and goes on without a jump.
     same, _ = run(diagram, [], 3.0, gaits=[(0.0, 0.0)])
