@@ -1,12 +1,13 @@
-"""``loco-drake export``: writes a policy as ONNX, and a robot as MJCF."""
+"""``loco-drake export``: writes a policy as ONNX, a plan, and a robot as MJCF."""
 
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from loco_drake.cli.options import Policy, UnusedSeed, option
+from loco_drake.cli.options import Policy, option
 from loco_drake.cli.output import print_table, write_json
-from loco_drake.common.errors import InputError
+from loco_drake.common.errors import InputError, check_at_least
+from loco_drake.motion.gaits import parse_schedule
 
 if TYPE_CHECKING:
     from loco_drake.models.robots import Robot
@@ -14,9 +15,10 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class Export:
-    """Write a policy as ONNX, from raw observations to actions, with metadata.
+    """Write a policy, a plan for it and the robot's model for use without Drake.
 
-    With --mjcf, write the robot's model for MuJoCo, and a policy only with --out.
+    The policy is ONNX, from raw observations to actions, with metadata. With --plans or
+    --mjcf a policy is written only with --out. See docs/deploy.md.
     """
 
     # Robot: go2 or a1.
@@ -24,30 +26,67 @@ class Export:
     policy: Policy = None
     out: Annotated[
         Path | None,
-        option("ONNX file to write.", default="policy.onnx; with --mjcf none"),
+        option(
+            "ONNX file to write.", default="policy.onnx; with --plans or --mjcf none"
+        ),
     ] = None
+    # NumPy file (.npz) to write: generated motion, re-timed within the joints' limits,
+    # and the set-points that follow it.
+    plans: Path | None = None
+    # With --plans: gait label, such as dog-trot, or a schedule of labels with start
+    # times in s, such as dog-pace,dog-trot@3.
+    gait: Annotated[str | None, option(metavar="STR", default="dog-trot")] = None
+    # With --plans: seconds of motion, at most 600.
+    duration: Annotated[float | None, option(metavar="FLOAT", default="10.0")] = None
     # MJCF file to write: bodies, limits, contacts and PD of the robot, for MuJoCo.
     mjcf: Path | None = None
     # Write the policy's metadata to this JSON file.
     json: Path | None = None
-    seed: UnusedSeed = 0
+    # With --plans: seed of the generated motion.
+    seed: int = 0
 
     def run(self) -> int:
         """Writes and prints; returns the exit status."""
         from loco_drake.models.robots import get_robot
 
         robot = get_robot(self.robot)
-        out = self.out or (None if self.mjcf else Path("policy.onnx"))
-        for name, path, suffix in (("out", out, ".onnx"), ("mjcf", self.mjcf, ".xml")):
-            if path is not None and path.suffix != suffix:
-                raise InputError(f"--{name} must end in {suffix}, not {str(path)!r}.")
-        if out is None and (self.json or self.policy):
-            raise InputError("--json and --policy are of a policy: add --out.")
+        alone = self.plans is None and self.mjcf is None
+        out = self.out or (Path("policy.onnx") if alone else None)
+        self._check(out)
         if out is not None:
             self._write_policy(robot, out)
+        if self.plans is not None:
+            self._write_plan(robot, self.plans)
         if self.mjcf is not None:
             self._write_mjcf(robot, self.mjcf)
         return 0
+
+    def _check(self, out: Path | None) -> None:
+        """Raises InputError if an option is wrong."""
+        for name, path, suffix in (
+            ("out", out, ".onnx"),
+            ("plans", self.plans, ".npz"),
+            ("mjcf", self.mjcf, ".xml"),
+        ):
+            if path is not None and path.suffix != suffix:
+                raise InputError(f"--{name} must end in {suffix}, not {str(path)!r}.")
+        if self.plans is None and (self.gait, self.duration) != (None, None):
+            raise InputError("--gait and --duration are of a plan: add --plans.")
+        if self.plans is not None:
+            self._check_plan()
+        if out is None and (self.json or self.policy):
+            raise InputError("--json and --policy are of a policy: add --out.")
+
+    def _check_plan(self) -> None:
+        from loco_drake.generation.generate import check_duration
+
+        if self.gait is None:
+            self.gait = "dog-trot"
+        if self.duration is None:
+            self.duration = 10.0
+        check_duration(self.duration)
+        parse_schedule(self.gait).check_ends_by(self.duration)
+        check_at_least("seed", self.seed, 0)
 
     def _write_policy(self, robot: "Robot", out: Path) -> None:
         from loco_drake.control.actor import load_actor
@@ -60,6 +99,27 @@ class Export:
         shown = [(name, metadata[name]) for name in ("robot", "labels", "rate")]
         size = f"{out.stat().st_size / 1e3:.0f} kB"
         print_table(str(out), ("of the policy", ""), [*shown, ("size", size)])
+
+    def _write_plan(self, robot: "Robot", path: Path) -> None:
+        from loco_drake.control.plan_file import save_plan
+        from loco_drake.systems.plan_recorder import PlanRecorder
+        from loco_drake.systems.scenario import GeneratedReference, Scenario
+
+        assert self.gait is not None
+        assert self.duration is not None
+        reference = GeneratedReference(
+            gait=self.gait, seed=self.seed, duration=self.duration
+        )
+        scenario = Scenario(robot=robot.name, reference=reference)
+        plan = PlanRecorder(scenario).record(self.duration)
+        save_plan(robot, plan, self.duration, path)
+        rows = [
+            ("robot", robot.name),
+            ("gait", self.gait),
+            ("seed", str(self.seed)),
+            ("duration, s", f"{self.duration:g}"),
+        ]
+        print_table(str(path), ("of the plan", ""), rows)
 
     def _write_mjcf(self, robot: "Robot", path: Path) -> None:
         from loco_drake.common.files import atomic_path

@@ -27,7 +27,7 @@ _COMMANDS = {
     "train generator": "train the GPT that generates tokens",
     "train tracker": "train the tracking policy with PPO",
     "train classifier": "train the transformer that classifies gaits",
-    "export": "write a policy as ONNX",
+    "export": "write a policy, a plan or a robot for use without Drake",
     "evaluate retargeting": "measure retargeted motion",
     "evaluate tokenizer": "measure reconstruction by the tokenizer",
     "evaluate generation": "compare generated with recorded motion",
@@ -39,7 +39,7 @@ _COMMANDS = {
 _MODULES = {"data list": "data", "data fetch": "fetch", "data inspect": "data"}
 _HELP = ("-h", "--help")
 # Options that name an output. Whether it is writable is checked before the work.
-_OUTPUTS = ("json", "html", "out", "figures", "record")
+_OUTPUTS = ("json", "html", "out", "figures", "record", "plans")
 _ONE_FILE = ("report", "export", "data inspect")  # --out is a file
 # Libraries that Drake needs and a bare Debian or Ubuntu lacks.
 _LIBRARIES = "libx11-6 libsm6 libglib2.0-0"

@@ -12,7 +12,7 @@ from loco_drake.models.robots import Robot
 
 ACTION_SCALE = 0.15  # rad per unit of action: 15 Nm on both robots
 GRAVITY = 9.81  # m/s^2
-_MAX_LOAD = 2.5  # robot weights
+MAX_LOAD = 2.5  # robot weights
 
 
 def joint_targets(set_points: Array, action: Array) -> Array:
@@ -59,7 +59,7 @@ def feed_forward_torques(robot: Robot, plan: Plan) -> Array:
     (Fuchioka et al. 2023, OPT-Mimic).
     """
     contacts = plan.contacts
-    load = np.clip(1 + plan.vdot[VELOCITY][:, 2] / GRAVITY, 0.0, _MAX_LOAD)
+    load = np.clip(1 + plan.vdot[VELOCITY][:, 2] / GRAVITY, 0.0, MAX_LOAD)
     share = contacts / np.maximum(contacts.sum(axis=1, keepdims=True), 1)
     force = robot.mass * GRAVITY * load[:, None] * share  # (N, 4)
     up_B = quat_rotate(quat_conjugate(plan.q[ORIENTATION]), np.array([0.0, 0.0, 1.0]))

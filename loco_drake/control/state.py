@@ -28,7 +28,7 @@ JOINT_VELOCITIES = np.s_[..., 6:]
 # What dividing a quaternion by its length leaves of the square's error.
 _ROUNDING = 1e-14
 # A robot that tilts further does not recover.
-_MAX_TILT = np.deg2rad(60.0)
+MAX_TILT = np.deg2rad(60.0)
 _CORNERS = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
 
 
@@ -63,7 +63,7 @@ def has_fallen(robot: Robot, q: Array) -> Bools:
     # The world's z axis in the trunk's frame.
     z_B = quat_to_matrix(q[ORIENTATION])[..., 2, :]
     lowest = q[..., HEIGHT] + (z_B @ (_CORNERS * robot.trunk_size).T).min(axis=-1)
-    return (lowest <= 0) | (z_B[..., 2] < np.cos(_MAX_TILT))
+    return (lowest <= 0) | (z_B[..., 2] < np.cos(MAX_TILT))
 
 
 @dataclass(kw_only=True)

@@ -16,6 +16,7 @@ from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.datasets.registry import DATASETS
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import any_label
+from loco_drake.tracking.deployment import deployment
 
 SET_POINTS = (
     "every 1 / rate s: q_d = q + (velocity_gain v + tau) / kp + action_scale * action, "
@@ -37,6 +38,8 @@ def policy_metadata(actor: Actor, robot: Robot) -> dict[str, str]:
     - action_scale (rad), velocity_gain (Nm s/rad) and set_points: what becomes of an
       action and of the plan
     - licence: of the recordings that the policy was learned from
+    - deployment: all of this in one JSON object, with the definition of the
+      observation, limits and test vectors, see :mod:`.deployment`
     """
     config = actor.config
     sources = dict.fromkeys(any_label(label).source for label in config.labels)
@@ -63,6 +66,7 @@ def policy_metadata(actor: Actor, robot: Robot) -> dict[str, str]:
         "set_points": SET_POINTS,
         "licence": "The weights are under the conditions of the recordings that they "
         f"were learned from, not under the code's licence. {licences}",
+        "deployment": deployment(actor, robot),
     }
     return {
         name: value if isinstance(value, str) else json.dumps(value)

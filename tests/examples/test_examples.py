@@ -5,8 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from loco_drake.cli.main import main
 from loco_drake.control.actor import load_actor
+from loco_drake.evaluation.tracking import joint_rmse
 from loco_drake.models.robots import get_robot
+from loco_drake.systems.scenario import GeneratedReference, Scenario
 from tests.process import run_python
 from tests.synthetic import write_dog_recording
 
@@ -89,6 +92,29 @@ def test_train_tracker_learns_and_leaves_a_policy_that_loads(tmp_path):
     assert actor.config.labels == ["dog-pace", "dog-trot"]
     assert np.isfinite(actor.mean.numpy()).all()
     assert (actor.mean.numpy() != 0).any()  # it has seen observations
+
+
+@pytest.mark.slow
+def test_an_exported_policy_trots_in_mujoco_without_a_fall(tmp_path, monkeypatch):
+    """As well as evaluate tracking finds, though it shares no code with it."""
+    pytest.importorskip("mujoco", reason="needs the extra 'mujoco'")
+    from loco_drake.evaluation.mujoco import MujocoRecorder
+    from loco_drake.models.mujoco_plant import MujocoConfig
+
+    monkeypatch.chdir(tmp_path)
+    files = "--out policy.onnx --plans plans.npz --mjcf go2.xml"
+    line = f"export {files} --gait dog-trot --duration 3 --seed 5"
+    assert main(line.split()) == 0
+    printed = run(tmp_path, "deploy_onnx.py")
+    figures = dict(re.findall(r"^(.+): (\S+)$", printed, re.MULTILINE))
+    assert float(figures["Largest error in the test vectors"]) < 1e-5
+    assert (figures["fell"], figures["simulated_s"]) == ("False", "3.000")
+    scenario = Scenario(reference=GeneratedReference(gait="dog-trot", duration=3.0))
+    recorder = MujocoRecorder(scenario, MujocoConfig())
+    recorder.start(seed=5)
+    expected = joint_rmse(recorder.run(3.0)[0])
+    assert float(figures["joint_rmse_rad"]) == pytest.approx(expected, abs=2e-3)
+    assert float(figures["from_plan_m"]) < 0.2
 
 
 def test_readme_shows_the_first_example_as_it_is():

@@ -85,6 +85,19 @@ def test_the_file_says_all_that_running_it_takes(exported):
     assert "solo8" not in metadata["licence"]
 
 
+def test_five_test_vectors_are_what_the_file_computes(exported):
+    _, session, _ = exported
+    about = json.loads(session.get_modelmeta().custom_metadata_map["deployment"])
+    assert about["schema_version"] == 1
+    cases = about["test_vectors"]
+    seen = np.array([case["observation"] for case in cases])
+    assert seen.shape == (5, OBSERVATION_SIZE)
+    (actions,) = session.run(["action"], {"observation": seen.astype(np.float32)})
+    expected = np.array([case["action"] for case in cases])
+    assert np.abs(expected).max() > 0.01
+    np.testing.assert_allclose(actions, expected, atol=about["test_tolerance"])
+
+
 def test_it_says_what_a_policy_ignores(exported):
     actor, session, _ = exported
     assert session.get_modelmeta().custom_metadata_map["ignored_parts"] == "[]"

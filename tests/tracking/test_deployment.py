@@ -1,0 +1,162 @@
+"""What an exported policy says of itself is true, and docs/deploy.md says it too."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from loco_drake.control.actor import PRIVILEGED, Actor, ActorConfig
+from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
+from loco_drake.models.robots import ROBOTS, get_robot
+from loco_drake.motion.gaits import GAITS, SOURCES, any_label
+from loco_drake.tracking.deployment import FORMULAS, PARTS, deployment
+
+PAGE = Path(__file__).parents[2] / "docs" / "deploy.md"
+
+
+def make_actor(robot, **config):
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(1)
+        labels = ["dog-trot", "horse-walk", "cat-leap"]
+        return Actor(ActorConfig(robot=robot, labels=labels, **config))
+
+
+@pytest.fixture(scope="module", params=ROBOTS)
+def about(request):
+    robot = get_robot(request.param)
+    return json.loads(json.dumps(deployment(make_actor(robot.name), robot)))
+
+
+def test_parts_are_the_observation(about):
+    parts = about["observation"]
+    assert [(p["name"], p["size"]) for p in parts] == list(OBSERVATION_LAYOUT)
+    ends = [part["start"] + part["size"] for part in parts]
+    assert [0, *ends] == [part["start"] for part in parts] + [OBSERVATION_SIZE]
+    assert {p["name"]: p["scale"] for p in parts if p["scale"] != 1} == {
+        "joint_velocities": 0.1,
+        "plan_joint_velocities": 0.1,
+    }
+    ahead = [part["name"] for part in parts if part["samples"] == [1, 2, 4, 8]]
+    # All of the plan but what is of the next sample only.
+    assert ahead == [
+        name
+        for name, _ in OBSERVATION_LAYOUT
+        if name.startswith("plan_") and name != "plan_joint_velocities"
+    ]
+
+
+def test_it_marks_what_a_policy_ignores(go2):
+    about = deployment(make_actor("go2", privileged=False), go2)
+    ignored = [part["name"] for part in about["observation"] if part["ignored"]]
+    assert ignored == list(PRIVILEGED)
+
+
+def toes(about, joints):
+    """Toes in B from the lengths in the file, leg by leg, by rotation matrices."""
+    lengths = about["feed_forward"]
+    p_BF = []
+    for leg in range(4):
+        a, b, c = joints[3 * leg : 3 * leg + 3]
+        thigh = np.array([0, 0, -lengths["thigh_length_m"]])
+        calf = np.array([0, 0, -lengths["calf_length_m"]])
+        offset = np.array([0, lengths["abduction_offset_m"][leg], 0])
+        leg_vector = about_y(b) @ (thigh + about_y(c) @ calf)
+        p_BF.append(lengths["p_BHip_m"][leg] + about_x(a) @ (offset + leg_vector))
+    return np.array(p_BF)
+
+
+def about_x(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+
+
+def about_y(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+
+def feed_forward(about, q, vdot, contacts):
+    """Torques by the page's formula, with a Jacobian by differences."""
+    given = about["feed_forward"]
+    load = np.clip(1 + vdot[5] / given["g_mps2"], 0, given["max_load"])
+    force = given["mass_kg"] * given["g_mps2"] * load * contacts
+    force /= max(sum(contacts), 1)
+    w, x, y, z = q[:4]
+    up_P = np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+    tau = given["joint_inertia_kgm2"] * vdot[6:]
+    for joint in range(12):
+        step = np.zeros(12)
+        step[joint] = 1e-6
+        column = (toes(about, q[7:] + step) - toes(about, q[7:] - step)) / 2e-6
+        tau[joint] -= np.sum(force * (column @ up_P))
+    return tau
+
+
+def test_set_points_follow_from_the_file_alone(about):
+    """And targets from set-points and actions, in five cases that differ."""
+    cases = about["test_vectors"]
+    assert len(cases) == 5
+    kp = np.array(about["pd"]["kp_nm_per_rad"])
+    gain = np.array(about["feed_forward"]["velocity_gain_nms_per_rad"])
+    scale = about["action"]["scale_rad"]
+    for case in cases:
+        case = {k: np.array(x) for k, x in case.items()}
+        q, v, vdot = case["plan_q"][0], case["plan_v"][0], case["plan_vdot"]
+        tau = feed_forward(about, q, vdot, case["plan_contacts"][0])
+        expected = q[7:] + (gain * v[6:] + tau) / kp
+        np.testing.assert_allclose(case["set_points"], expected, atol=1e-6)
+        target = case["set_points"] + scale * case["action"]
+        np.testing.assert_allclose(case["target"], target, atol=1e-12)
+    # Among them are forces below and above the weight, and both signs of a quaternion.
+    loads = [1 + case["plan_vdot"][5] / 9.81 for case in cases]
+    assert max(loads) > 1 > min(loads)
+    signs = {np.sign(np.dot(c["q"][:4], c["plan_q"][0][:4])) for c in cases}
+    assert signs == {-1, 1}
+
+
+def test_labels_are_coded_as_it_says(about):
+    sources, gaits = about["label"]["sources"], about["label"]["gaits"]
+    labels = [case["label"] for case in about["test_vectors"]]
+    assert labels[:4] == ["dog-trot", "horse-walk", "cat-leap", "dog-trot"]
+    for case in about["test_vectors"]:
+        label = any_label(case["label"])
+        code = [float(label.source == s) for s in sources]
+        code += [float(label.gait == g) for g in gaits]
+        assert case["observation"][-12:] == code
+
+
+def test_gains_and_limits_are_those_of_the_motors(go2):
+    """100 Nm/rad and 3 Nm s/rad, of which a step of 10 ms of Drake's is a third."""
+    about = deployment(make_actor("go2"), go2)
+    assert about["pd"]["kp_nm_per_rad"] == [100.0] * 12
+    assert about["pd"]["kd_nms_per_rad"] == [3.0] * 12
+    assert about["pd"]["drake"] == {"step_s": 0.01, "kd_nms_per_rad": [2.0] * 12}
+    assert about["feed_forward"]["velocity_gain_nms_per_rad"] == [2.0] * 12
+    assert about["network"]["period_s"] == 0.02
+    effort = about["joints"]["effort_nm"]
+    assert effort == pytest.approx([23.7, 23.7, 35.55] * 4)
+    assert about["fallen"]["tilt_rad"] == pytest.approx(np.pi / 3)
+
+
+def test_the_page_defines_the_parts_with_the_same_words():
+    section = PAGE.read_text().split("## Observation\n")[1].split("\n## ")[0]
+    rows = re.findall(r"^\| `(\w+)` \|(.*)\|$", section, re.M)
+    table = {name: [cell.strip() for cell in row.split("|")] for name, row in rows}
+    start = 0
+    for name, size in OBSERVATION_LAYOUT:
+        part = PARTS[name]
+        scale = f"{part.scale:g}"
+        places = f"{start} to {start + size - 1}" if size > 1 else str(start)
+        samples = {"now": "", "next": "n + 1", "ahead": "n + 1, 2, 4, 8"}[part.samples]
+        row = [places, f"`{part.formula}`", samples, part.unit, part.frame, scale]
+        assert table[name] == row
+        start += size
+    text = " ".join(PAGE.read_text().split())
+    for formula in FORMULAS.values():
+        assert f"`{formula}`" in text
+    sources, gaits = ", ".join(SOURCES), ", ".join(GAITS)
+    assert f"1 for the source: {sources}." in text
+    assert f"1 for the gait: {gaits}." in text
