@@ -7,7 +7,7 @@ need Chromium on the path (``chromium``, headless), `retargeting` the recordings
     python docs/draw.py retargeting docs/images/retargeting.png --html replay.html
     python docs/draw.py gait-change docs/images/gait_change.png
     python docs/draw.py library docs/images/library.png
-    python docs/draw.py steering docs/images
+    python docs/draw.py steering
     python docs/draw.py gait-choice docs/images/gait_choice.png
 
 ``loco-drake evaluate ... --figures`` draws the others.

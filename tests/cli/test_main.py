@@ -81,7 +81,7 @@ WRONG = {
     "train fly": "'train fly'; the choices are train tokenizer, train generator",
     "data": "Name a subcommand: data list, data fetch, data inspect",
     "simulate --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
-    "simulate --gait dog-fly": f"Unknown gait 'dog-fly'; the choices are {GAITS}",
+    "simulate --gait dog-fly": f"Unknown gait 'dog-fly'; the choices are any, {GAITS}",
     "simulate --gait dog-pace,dog-trot": "the time in s at which it begins",
     "simulate --gait dog-pace,dog-trot@12": "before the end, at 10 s",
     "simulate --duration 0": DURATION,
