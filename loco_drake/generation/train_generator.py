@@ -110,10 +110,7 @@ def train_generator(
         InputError: if the tokenizer does not know a robot of the library, or all
             clips of a label are too short.
     """
-    missing = sorted(set(library.robots) - set(tokenizer.config.robots))
-    if missing:
-        known = ", ".join(tokenizer.config.robots)
-        raise InputError(f"The tokenizer knows {known}, not {', '.join(missing)}.")
+    check_known("tokenizer", library.robots, tokenizer.config.robots)
     clips = stitched_clips(library.train, stitched, settings.seed)
     encoded = encode_clips(tokenizer, clips, config.codebooks)
     with torch.random.fork_rng(devices=[]):
@@ -141,6 +138,15 @@ def train_generator(
         path = Path(settings.out) / "generator.safetensors"
         save_network(path, "generator", generator, info, half=True)
     return generator, result
+
+
+def check_known(what: str, found: Sequence[str], known: Sequence[str]) -> None:
+    """Raises InputError if names are ``found`` that ``what`` was not trained on."""
+    missing = sorted(set(found) - set(known))
+    if missing:
+        raise InputError(
+            f"The {what} knows {', '.join(known)}, not {', '.join(missing)}."
+        )
 
 
 def make_batch(

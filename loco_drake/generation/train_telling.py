@@ -17,6 +17,7 @@ from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.train_generator import (
     BATCH,
     STITCHED,
+    check_known,
     encode_clips,
     generator_loss,
     make_batch,
@@ -123,12 +124,6 @@ def _check(library: Library, tokenizer: Tokenizer, plain: Generator) -> None:
             f"The generator's weights are for the tokenizer {plain.config.tokenizer}, "
             f"not for {tokenizer.fingerprint}."
         )
-    for what, found, known in (
-        ("tokenizer", library.robots, tokenizer.config.robots),
-        ("generator", tuple(map(str, library.labels)), plain.config.labels),
-    ):
-        missing = sorted(set(found) - set(known))
-        if missing:
-            raise InputError(
-                f"The {what} knows {', '.join(known)}, not {', '.join(missing)}."
-            )
+    check_known("tokenizer", library.robots, tokenizer.config.robots)
+    labels = [str(label) for label in library.labels]
+    check_known("generator", labels, plain.config.labels)
