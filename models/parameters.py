@@ -88,11 +88,15 @@ def least_strength(robot: Robot, plant: PlantConfig) -> float:
 
 
 def check_strength(robot: Robot, plant: PlantConfig, strength: float) -> None:
-    """Raises InputError if the motors are too weak; see :func:`least_strength`."""
+    """Raises InputError if the motors are too weak; see :func:`least_strength`.
+
+    Of motors with another damping, ``strength`` is theirs times the damping's factor.
+    """
     least = least_strength(robot, plant)
     if not least <= strength < np.inf:
         raise InputError(
             f"The motor strength of {robot.name} must be at least {least:g} at a time "
             f"step of {plant.time_step:g} s, not {strength:g}: below, the mass matrix "
-            "would not be positive definite in every pose."
+            "would not be positive definite in every pose. A factor of the damping "
+            "multiplies it."
         )

@@ -84,6 +84,8 @@ def AddRobotPlant(
     robot: Robot,
     config: PlantConfig,
     pre_finalize: Callable[[MultibodyPlant, SceneGraph], None] | None = None,
+    *,
+    movable_ground: bool = False,
 ) -> tuple[MultibodyPlant, SceneGraph, ModelInstanceIndex]:
     """Adds a finalized plant with ``robot`` and a ground, and a scene graph.
 
@@ -95,7 +97,7 @@ def AddRobotPlant(
     stiffness robot.kp and the damping :func:`plant_damping`.
 
     With the contact "cenic" also call :func:`ConfigureSimulator`. ``pre_finalize`` may
-    add to the plant.
+    add to the plant. ``movable_ground`` can be inclined, see :func:`.ground.AddGround`.
 
     Returns:
         The plant, the scene graph and the robot's model instance.
@@ -125,7 +127,12 @@ def AddRobotPlant(
     for joint, p, d in zip(robot.joint_names, robot.kp, damping, strict=True):
         actuator = plant.GetJointActuatorByName(joint.removesuffix("_joint"))
         actuator.set_controller_gains(PdControllerGains(p=p, d=d))
-    AddGround(plant, friction=config.friction, visual=config.visual)
+    AddGround(
+        plant,
+        friction=config.friction,
+        visual=config.visual,
+        movable=movable_ground,
+    )
     if pre_finalize is not None:
         pre_finalize(plant, scene_graph)
     plant.Finalize()

@@ -15,6 +15,7 @@ from loco_drake.control.observation import OBSERVATION_SIZE, observe, preview
 from loco_drake.control.plan import PLAN_DT, Plan, standing_plan
 from loco_drake.control.reward import REWARD_TERMS, reward_terms
 from loco_drake.control.state import unit_base
+from loco_drake.control.terrain import Terrain
 from loco_drake.models.robots import Robot
 
 
@@ -57,18 +58,33 @@ class RobotState(LeafSystem):
         output_ports:
         - state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s
 
-    All observers of the robot read this port rather than the plant's.
+    All observers of the robot read this port rather than the plant's. On a terrain,
+    which is a parameter, the state is that over the ground, see :class:`Terrain`.
     """
 
     def __init__(self, robot: Robot) -> None:
         super().__init__()
         self.robot = robot
         size = 13 + 2 * len(robot.joint_names)
+        self._terrain = self.DeclareAbstractParameter(Value[object](None))
         self._state = self.DeclareVectorInputPort("plant_state", size)
         self.DeclareVectorOutputPort("state", size, self._calc)
 
+    def SetTerrain(self, context: Context, terrain: Terrain | None) -> None:
+        """Sets the terrain, None if level, in ``context``, this system's own."""
+        context.get_mutable_abstract_parameter(self._terrain).set_value(terrain)
+
+    def GetTerrain(self, context: Context) -> Terrain | None:
+        """Returns the terrain in ``context``, this system's own."""
+        terrain: Terrain | None = context.get_abstract_parameter(
+            self._terrain
+        ).get_value()
+        return terrain
+
     def _calc(self, context: Context, output: Any) -> None:
-        output.set_value(unit_base(self._state.Eval(context)))
+        state = unit_base(self._state.Eval(context))
+        terrain = self.GetTerrain(context)
+        output.set_value(state if terrain is None else terrain.over_ground(state))
 
 
 def FindRobot(diagram: Diagram) -> tuple[Robot, MultibodyPlant, ModelInstanceIndex]:

@@ -147,7 +147,11 @@ def AddLocomotion(
         )
     robot = get_robot(scenario.robot)
     plant, scene_graph, instance = AddRobotPlant(
-        builder, robot, scenario.plant, pre_finalize
+        builder,
+        robot,
+        scenario.plant,
+        pre_finalize,
+        movable_ground=scenario.disturbances.terrain,
     )
     made = Locomotion(robot, plant, scene_graph, instance)
     robot_state, plant_state = RobotState(robot), plant.get_state_output_port(instance)

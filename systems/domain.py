@@ -20,7 +20,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.control.domain import MAX_LATENCY, Domain, draw_error, measure
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.state import JOINT_VELOCITIES, JOINTS, split
-from loco_drake.models.ground import SetGround
+from loco_drake.models.ground import HasMovableGround, SetGradient, SetGround
 from loco_drake.models.parameters import (
     SetReflectedInertia,
     SetTrunkLoad,
@@ -33,6 +33,8 @@ from loco_drake.models.robots import Robot
 from .control import FindRobot
 
 DISTURBING_SYSTEMS = ("actuation", "pushes", "sensors")
+# Speed at which a joint has three quarters of its Coulomb friction, rad/s.
+_FRICTION_SPEED = 0.2
 _TOLERANCE = 1e-6  # s, or of a sample; context times are sums of steps
 
 
@@ -52,7 +54,7 @@ class DomainSystem(LeafSystem):
 
 
 class Actuation(DomainSystem):
-    """Simulates latency and strength of the motors by changing the PD set-points.
+    """Simulates unlike motors and joint friction by changing the PD set-points.
 
     .. pydrake_system::
 
@@ -84,6 +86,16 @@ class Actuation(DomainSystem):
     both terms. Under "cenic" h is 0, and the rotor inertia does not change. The effort
     limits do not change either: a weak motor has less torque at the same command, but
     the same maximum.
+
+    *Damping.* For damping d, relative to the model's, s (1 - d) kd / kp v is added to
+    the set-point and s (1 - d) kd h subtracted from the rotor inertia. The joints then
+    move as with the gains s kp and s d kd.
+
+    *Joint friction.* Coulomb's torque -f sign(v) is added to that of the PD, with
+    tanh(v / .2 rad/s) for sign(v) and v at the beginning of a step. It does not hold a
+    joint that stands: the PD does. In a step of 10 ms the largest f changes v by less
+    than .2 rad/s, since the damped step resists like an inertia kd h, and joints come
+    to rest without chatter.
     """
 
     def __init__(self, robot: Robot, plant: PlantConfig) -> None:
@@ -99,16 +111,18 @@ class Actuation(DomainSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(plant.time_step, 0.0, self._remember)
         self.DeclareVectorOutputPort("desired_state", 2 * joints, self._calc)
 
-    def reflected_inertia(self, strength: Array) -> Array:
-        """Returns the rotor inertia at the joints for this strength, kg m^2, (12,).
+    def reflected_inertia(self, damping: Array) -> Array:
+        """Returns the rotor inertia at the joints, kg m^2, (12,).
+
+        ``damping`` is that of each motor over its model's: s d as above.
 
         Raises:
             InputError: if a motor is weaker than
                 :func:`loco_drake.models.parameters.least_strength`.
         """
-        check_strength(self._robot, self._plant, float(np.min(strength)))
+        check_strength(self._robot, self._plant, float(np.min(damping)))
         surplus = surplus_inertia(self._robot, self._plant)
-        return self._robot.reflected_inertia - (1 - strength) * surplus
+        return self._robot.reflected_inertia - (1 - damping) * surplus
 
     def _remember(self, context: Context, values: DiscreteValues) -> None:
         if self._domain(context).latency == 0:
@@ -122,10 +136,22 @@ class Actuation(DomainSystem):
         domain = self._domain(context)
         q_d = self._delayed(context, domain)
         if domain.strength is not None:
-            q, v = split(self._state.Eval(context))
-            rest = q[JOINTS] + self._prediction * v[JOINT_VELOCITIES]
+            q, v = self._joint_state(context)
+            rest = q + self._prediction * v
             q_d = domain.strength * q_d + (1 - domain.strength) * rest
+        if domain.damping is not None:
+            _, v = self._joint_state(context)
+            share = 1.0 if domain.strength is None else domain.strength
+            q_d = q_d + share * (1 - domain.damping) * self._prediction * v
+        if domain.joint_friction > 0:
+            _, v = self._joint_state(context)
+            friction = domain.joint_friction * np.tanh(v / _FRICTION_SPEED)
+            q_d = q_d - friction / self._robot.kp
         output.set_value(np.concatenate((q_d, np.zeros(self._joints))))
+
+    def _joint_state(self, context: Context) -> tuple[Array, Array]:
+        q, v = split(self._state.Eval(context))
+        return q[JOINTS], v[JOINT_VELOCITIES]
 
     def _delayed(self, context: Context, domain: Domain) -> Array:
         now = self._desired.Eval(context)[: self._joints]
@@ -210,28 +236,40 @@ def SetDomain(diagram: Diagram, context: Context, domain: Domain) -> None:
     Raises:
         InputError: if the diagram lacks a disturbance that the domain needs.
     """
-    for name in DISTURBING_SYSTEMS:
-        if domain.needs(name) and not diagram.HasSubsystemNamed(name):
+    robot, plant, instance = FindRobot(diagram)
+    present = {name for name in DISTURBING_SYSTEMS if diagram.HasSubsystemNamed(name)}
+    if HasMovableGround(plant):
+        present.add("terrain")
+    for name in (*DISTURBING_SYSTEMS, "terrain"):
+        if domain.needs(name) and name not in present:
             raise InputError(
                 f"This domain needs a scenario with the disturbance {name}: "
                 f"Scenario(disturbances=Disturbances({name}=True))."
             )
-    robot, plant, instance = FindRobot(diagram)
     plant_context = plant.GetMyMutableContextFromRoot(context)
     if domain.friction is not None or domain.stiffness is not None:
         scene_graph = diagram.GetSubsystemByName("scene_graph")
         ground = scene_graph.GetMyMutableContextFromRoot(context)
         contact = {"friction": domain.friction, "stiffness": domain.stiffness}
         SetGround(plant, scene_graph, ground, **contact)
+    if "terrain" in present:
+        terrain = domain.terrain
+        SetGradient(
+            plant, plant_context, np.zeros(2) if terrain is None else terrain.gradient
+        )
+        state = diagram.GetSubsystemByName("robot_state")
+        state.SetTerrain(state.GetMyMutableContextFromRoot(context), terrain)
     if domain.payload is not None or domain.com_shift is not None:
         trunk = plant.GetBodyByName(robot.trunk_frame, instance)
         shift = np.zeros(3) if domain.com_shift is None else domain.com_shift
         mass = domain.payload or 0.0
         SetTrunkLoad(trunk, plant_context, mass=mass, p_shift_B=shift)
-    if domain.strength is not None:
+    if domain.strength is not None or domain.damping is not None:
         actuation = diagram.GetSubsystemByName("actuation")
-        inertia = actuation.reflected_inertia(domain.strength)
+        strength = np.ones(12) if domain.strength is None else domain.strength
+        damping = 1.0 if domain.damping is None else domain.damping
+        inertia = actuation.reflected_inertia(strength * damping)
         SetReflectedInertia(plant, instance, plant_context, inertia)
-    for name in filter(diagram.HasSubsystemNamed, DISTURBING_SYSTEMS):
+    for name in present - {"terrain"}:
         system = diagram.GetSubsystemByName(name)
         system.SetDomain(system.GetMyMutableContextFromRoot(context), domain)

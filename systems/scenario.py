@@ -120,7 +120,7 @@ class ExternalTargets:
 # Hashable, since batches cache one diagram of each kind.
 @dataclass(kw_only=True, unsafe_hash=True)
 class Disturbances:
-    """Systems that simulate a world unlike the model, see :mod:`.domain`.
+    """What a diagram needs to simulate a world unlike the model, see :mod:`.domain`.
 
     They have no effect until SetDomain sets a domain.
     """
@@ -128,6 +128,7 @@ class Disturbances:
     actuation: bool = False  # latency and strength of the motors
     pushes: bool = False  # forces on the trunk
     sensors: bool = False  # errors of the state that the policy observes
+    terrain: bool = False  # ground that can be inclined
 
 
 @dataclass(kw_only=True)

@@ -193,7 +193,7 @@ def _place_on_plan(diagram: Diagram, root: Context) -> None:
 
 
 def PlaceOnPlan(diagram: Diagram, root: Context) -> None:
-    """Sets the robot to the present state of its plan.
+    """Sets the robot to the present state of its plan; on a slope, turned with it.
 
     Args:
         diagram: a locomotion diagram that tracks a plan.
@@ -202,6 +202,10 @@ def PlaceOnPlan(diagram: Diagram, root: Context) -> None:
     plan_state = diagram.GetSubsystemByName("plan_state")
     context = plan_state.GetMyContextFromRoot(root)
     state = plan_state.GetOutputPort("state").Eval(context)
+    robot_state = diagram.GetSubsystemByName("robot_state")
+    terrain = robot_state.GetTerrain(robot_state.GetMyContextFromRoot(root))
+    if terrain is not None:
+        state = terrain.in_world(terrain.placed(state))
     _, plant, instance = FindRobot(diagram)
     context = plant.GetMyMutableContextFromRoot(root)
     plant.SetPositionsAndVelocities(context, instance, state)

@@ -23,6 +23,7 @@ from loco_drake.control.state import (
     VELOCITY,
     split,
 )
+from loco_drake.control.terrain import Terrain
 from loco_drake.models.parameters import LEAST_PAYLOAD
 
 MAX_LATENCY = 0.1  # s
@@ -45,6 +46,8 @@ BOUNDS = {
     "com_shift": (-0.2, 0.2),
     "strength": (0.5, 1.5),
     "latency": (0.0, MAX_LATENCY),
+    "damping": (0.5, 2.0),
+    "joint_friction": (0.0, 0.5),
 }
 
 
@@ -117,6 +120,10 @@ class Domain(_Checked, Immutable):
     strength: Array | None = None
     # Delay of the set-points, s, rounded to whole steps of the plant.
     latency: float = 0.0
+    # Damping of each motor over its model's, at equal strength.
+    damping: float | None = None
+    joint_friction: float = 0.0  # Coulomb friction of each joint, N m
+    terrain: Terrain | None = None  # ground that is not level
     pushes: tuple[Push, ...] = ()  # in any order; overlapping forces add up
     sensors: SensorErrors | None = None  # errors of the measured state
 
@@ -126,7 +133,10 @@ class Domain(_Checked, Immutable):
     def needs(self, name: str) -> bool:
         """Returns whether this domain requires the disturbance ``name``."""
         if name == "actuation":
-            return self.strength is not None or self.latency > 0
+            motors = self.strength is not None or self.damping is not None
+            return motors or self.latency > 0 or self.joint_friction > 0
+        if name == "terrain":
+            return self.terrain is not None
         return bool(self.pushes) if name == "pushes" else self.sensors is not None
 
 

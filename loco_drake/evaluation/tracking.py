@@ -33,7 +33,6 @@ from loco_drake.control.state import (
     VELOCITY,
     has_fallen,
     split,
-    unit_base,
 )
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import ROW_LABELS, GaitLabel
@@ -167,12 +166,11 @@ class Recorder:
         )
 
     def _monitor(self, root: Context) -> EventStatus:
-        plant, instance = self._made.plant, self._made.instance
-        q = plant.GetPositions(plant.GetMyContextFromRoot(root), instance)
-        if has_fallen(self._made.robot, unit_base(np.asarray(q))):
+        q, _ = split(self.diagram.GetOutputPort("state").Eval(root))
+        if has_fallen(self._made.robot, q):
             self.fell = True
         if self.fell and self._ends_at_fall:
-            return EventStatus.ReachedTermination(plant, "the robot fell")
+            return EventStatus.ReachedTermination(self._made.plant, "the robot fell")
         return EventStatus.DidNothing()
 
 

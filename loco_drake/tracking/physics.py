@@ -12,6 +12,7 @@ from pydrake.systems.framework import Diagram
 
 from loco_drake.control.domain import Domain
 from loco_drake.control.plan import PLAN_DT
+from loco_drake.control.terrain import Terrain
 from loco_drake.models.plant import ConfigureSimulator, PlantConfig
 from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.domain import SetDomain
@@ -109,10 +110,12 @@ class OwnWorld(_Simulation):
         disturbances = replace(config.randomization.disturbances, sensors=False)
         super().__init__(config, disturbances)
         self._sample = 0
+        self._terrain: Terrain | None = None
 
     def begin(self, domain: Domain, sample: int) -> None:
         """Begins an episode in ``domain``, at a sample of a plan."""
         self._sample = sample
+        self._terrain = domain.terrain
         self._context.SetTime(sample * PLAN_DT)
         if self._diagram.HasSubsystemNamed("actuation"):
             actuation = self._diagram.GetSubsystemByName("actuation")
@@ -125,6 +128,8 @@ class OwnWorld(_Simulation):
 
     def advance(self, state: Array, desired_state: Array) -> Array:
         """Returns the state after a control period; see :class:`SharedWorld`."""
-        self._set(state, desired_state)
+        terrain = self._terrain
+        self._set(state if terrain is None else terrain.in_world(state), desired_state)
         self._sample += 1
-        return self._advance(self._sample * PLAN_DT)
+        state = self._advance(self._sample * PLAN_DT)
+        return state if terrain is None else terrain.over_ground(state)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError, check_bounds
 from loco_drake.control.domain import BOUNDS, Domain, Push, SensorErrors, error_vector
+from loco_drake.control.terrain import MAX_SLOPE, slope
 
 # Commands have these ranges as options; their --help does not wait for Drake.
 if TYPE_CHECKING:
@@ -67,6 +68,12 @@ class RandomizationConfig:
     push: tuple[float, float] | None = None
     # Time from the start to the first push and between pushes, s.
     push_interval: tuple[float, float] = (1.0, 3.0)
+    # Damping of the motors over that of their model.
+    damping: tuple[float, float] | None = None
+    # Coulomb friction of each joint, N m.
+    joint_friction: tuple[float, float] | None = None
+    # Incline of the ground in degrees, in a random direction.
+    slope: tuple[float, float] | None = None
     # Sensor errors, as a multiple of the standard deviations in docs/tracking.md.
     noise: float | None = None
 
@@ -82,6 +89,7 @@ class RandomizationConfig:
 
         limits = {**BOUNDS, "push": (0.0, inf), "push_interval": (PUSH_DURATION, inf)}
         limits["motor_strength"] = limits.pop("strength")
+        limits["slope"] = (0.0, MAX_SLOPE)
         for name, (least, most) in limits.items():
             bounds = getattr(self, name)
             if bounds is None:
@@ -93,8 +101,9 @@ class RandomizationConfig:
                     f"The randomization's {name} must be two numbers, the smaller one "
                     f"first, of at least {least:g}{limit}, not {low:g} and {high:g}."
                 )
-        if robot is not None and self.motor_strength is not None:
-            check_strength(robot, plant or PlantConfig(), self.motor_strength[0])
+        if robot is not None and not (self.motor_strength is self.damping is None):
+            weakest = (self.motor_strength or (1.0,))[0] * (self.damping or (1.0,))[0]
+            check_strength(robot, plant or PlantConfig(), weakest)
         if self.noise is not None:
             check_bounds("The randomization's noise", self.noise, 0)
 
@@ -109,9 +118,18 @@ class RandomizationConfig:
         from loco_drake.systems.scenario import Disturbances
 
         return Disturbances(
-            actuation=self.motor_strength is not None or self.latency is not None,
+            actuation=any(
+                part is not None
+                for part in (
+                    self.motor_strength,
+                    self.latency,
+                    self.damping,
+                    self.joint_friction,
+                )
+            ),
             pushes=self.push is not None,
             sensors=self.noise is not None,
+            terrain=self.slope is not None,
         )
 
     @property
@@ -159,6 +177,11 @@ class RandomizationConfig:
                 white=self.noise * WHITE,
                 seed=int(random.integers(2**32)),
             ),
+            damping=uniform(self.damping),
+            joint_friction=uniform(self.joint_friction) or 0.0,
+            terrain=None
+            if self.slope is None
+            else slope(uniform(self.slope), random.uniform(-np.pi, np.pi)),
         )
 
     def _draw_pushes(

@@ -11,6 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 from loco_drake.common.errors import InputError
 from loco_drake.control.domain import Domain, Push, SensorErrors
 from loco_drake.control.plan import PLAN_DT
+from loco_drake.control.terrain import slope
 from loco_drake.models.plant import (
     CONTACTS,
     ConfigureSimulator,
@@ -28,6 +29,7 @@ from loco_drake.systems.scenario import (
     Scenario,
 )
 
+ALL = Disturbances(actuation=True, pushes=True, sensors=True, terrain=True)
 GRAVITY = 9.81
 GO2_MASS, GO2_TRUNK = 16.085, 7.277  # kg, as in its URDF
 FAR_UP = 50.0  # m
@@ -45,7 +47,7 @@ class Standing:
                 reference=PlanReference(),
                 smoother=None,
                 policy=ExternalAction(),
-                disturbances=Disturbances(actuation=True, pushes=True, sensors=True),
+                disturbances=ALL,
             )
         )
         self.diagram = diagram
@@ -230,7 +232,93 @@ def test_joints_move_as_with_gains_that_much_lower(go2, contact, strength):
     assert np.abs(theirs - nominal).max() > 0.1
 
 
-def _with_scaled_gains(go2, contact, strength):
+@pytest.mark.parametrize("contact", ["similar", "lagged", "sap"])
+def test_joints_move_as_with_motors_that_damp_that_much_more_or_less(go2, contact):
+    """In the air, against a plant built with .9 of kp and .9 d of kd.
+
+    The plant's own damping is what the step's h kp leaves of that.
+    """
+    for damping in (0.9, 1.3):
+        domain = Domain(strength=np.full(12, 0.9), damping=damping)
+        robot = Standing(go2, domain, PlantConfig(contact=contact), height=FAR_UP)
+        ours = []
+        for k in range(25):
+            robot.act(np.sin(0.7 * k))
+            ours.append(robot.advance((k + 1) * PLAN_DT))
+        theirs = _with_scaled_gains(go2, contact, 0.9, damping)
+        np.testing.assert_allclose(ours, theirs, atol=1e-6)
+        assert np.abs(theirs - _with_scaled_gains(go2, contact, 0.9)).max() > 0.05
+
+
+def test_joint_friction_opposes_a_joint_that_turns_and_none_that_stands(go2):
+    """.3 N m, from the change of the set-point times kp, at 2 rad/s and at rest."""
+    with_friction, without = (
+        Standing(go2, Domain(joint_friction=friction), height=FAR_UP)
+        for friction in (0.3, 0.0)
+    )
+    asked = []
+    for robot in (with_friction, without):
+        v = np.zeros(18)
+        v[6:] = [2.0, -2.0, 0.0] * 4
+        robot.plant.SetVelocities(robot.plant_context, v)
+        port = robot.diagram.GetOutputPort("desired_state")
+        asked.append(go2.kp * port.Eval(robot.context)[:12])
+    torque = asked[0] - asked[1]
+    np.testing.assert_allclose(torque, [-0.3, 0.3, 0.0] * 4, atol=1e-9)
+
+
+def test_joints_with_the_largest_friction_come_to_rest(go2):
+    """The torque is explicit: a step that is too long for it would chatter."""
+    weak = Domain(joint_friction=0.5, damping=0.8)
+    for height in (0.0, FAR_UP):
+        robot = Standing(go2, weak, height=height)
+        robot.act(0.5)
+        robot.advance(2.0)
+        speeds = [robot.advance(2.0 + 0.01 * k)[25:] for k in range(1, 20)]
+        assert np.abs(speeds).max() < 5e-3
+
+
+@pytest.mark.parametrize("contact", ["similar", "cenic"])
+def test_a_robot_slides_down_a_steep_slope_as_physics_says(go2, contact):
+    """20 degrees with .178: g (sin - .178 cos) along the slope, here along -x."""
+    terrain = slope(20.0, 0.0)
+    plant = PlantConfig(contact=contact)
+    robot = Standing(go2, Domain(friction=0.1, terrain=terrain), plant)
+    place(robot, terrain)
+    robot.advance(0.2)
+    start = robot.momentum / GO2_MASS
+    robot.advance(0.6)
+    change = (robot.momentum / GO2_MASS - start) / 0.4
+    angle = np.deg2rad(20.0)
+    size = GRAVITY * (np.sin(angle) - 0.16 / 0.9 * np.cos(angle))
+    down = -np.array([np.cos(angle), 0.0, np.sin(angle)])
+    np.testing.assert_allclose(change, size * down, atol=0.03 * size)
+
+
+def test_a_robot_stands_on_a_slope_and_its_height_is_that_over_the_ground(go2):
+    terrain = slope(8.0, 0.7)
+    robot = Standing(go2, Domain(terrain=terrain))
+    place(robot, terrain, at=(3.0, -1.0))
+    robot.advance(1.0)
+    forces = robot.contacts[0]
+    np.testing.assert_allclose(forces.sum(axis=0)[2], GO2_MASS * GRAVITY, rtol=0.02)
+    rise = np.tan(np.deg2rad(8.0)) * np.array([np.cos(0.7), np.sin(0.7)])
+    x, y, z = robot.state[4:7]
+    height = robot.diagram.GetOutputPort("state").Eval(robot.context)[6]
+    assert height == pytest.approx(z - rise @ [x, y])
+    assert height == pytest.approx(go2.stand_height, abs=0.02)
+    assert z > 0.5
+
+
+def place(robot, terrain, at=(0.0, 0.0)):
+    """Puts a standing robot on the slope."""
+    state = robot.state
+    state[4:6] = at
+    state = terrain.in_world(terrain.placed(state))
+    robot.plant.SetPositionsAndVelocities(robot.plant_context, state)
+
+
+def _with_scaled_gains(go2, contact, strength, damping=1.0):
     """States (25, 37) of a robot in the air, sent the set-points of the test above."""
     builder = DiagramBuilder()
     config = MultibodyPlantConfig(
@@ -242,9 +330,10 @@ def _with_scaled_gains(go2, contact, strength):
     instance = AddRobotModel(Parser(plant), go2.name, visual=False)
     for index in plant.GetJointActuatorIndices():
         gains = plant.get_joint_actuator(index).get_controller_gains()
-        damping = gains.d - 0.01 * gains.p  # the step damps by the rest
+        # The step damps by the rest.
+        d = damping * gains.d - 0.01 * gains.p
         plant.get_joint_actuator(index).set_controller_gains(
-            PdControllerGains(p=strength * gains.p, d=strength * damping)
+            PdControllerGains(p=strength * gains.p, d=strength * d)
         )
     plant.Finalize()
     simulator = Simulator(builder.Build())
@@ -294,6 +383,9 @@ def test_a_domain_like_the_model_changes_nothing(go2):
     [
         ("actuation", Domain(latency=0.02)),
         ("actuation", Domain(strength=np.ones(12))),
+        ("actuation", Domain(damping=1.1)),
+        ("actuation", Domain(joint_friction=0.1)),
+        ("terrain", Domain(terrain=slope(5.0, 0.0))),
         ("pushes", Domain(pushes=(Push(start=0, duration=1, force_W=np.ones(3)),))),
         (
             "sensors",
@@ -302,7 +394,7 @@ def test_a_domain_like_the_model_changes_nothing(go2):
     ],
 )
 def test_a_diagram_without_the_system_is_refused(name, domain):
-    text = "disturbances: {actuation: true, pushes: true, sensors: true}"
+    text = "disturbances: {actuation: true, pushes: true, sensors: true, terrain: true}"
     scenario = LoadScenario(
         data="{reference: !PlanReference {}, policy: !ExternalAction {}}", overlay=text
     )
@@ -322,6 +414,9 @@ def test_all_of_it_is_in_the_context(go2):
         payload=2.0,
         com_shift=np.array([0.02, 0.0, 0.0]),
         strength=np.linspace(0.9, 1.1, 12),
+        damping=1.1,
+        joint_friction=0.2,
+        terrain=slope(4.0, 2.0),
         latency=0.02,
         pushes=(Push(start=0.2, duration=0.1, force_W=np.array([60.0, 0, 0])),),
     )

@@ -16,7 +16,7 @@ from loco_drake.systems.scenario import (
     PlanReference,
     Scenario,
 )
-from loco_drake.systems.simulator import MakeSimulator
+from loco_drake.systems.simulator import MakeSimulator, PlaceOnPlan
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.config import EnvironmentConfig, ResetNoise
 from loco_drake.tracking.environment import TrackingEnv
@@ -29,7 +29,13 @@ from loco_drake.tracking.randomization import (
 )
 
 NO_NOISE = ResetNoise(joints=0, velocities=0, position=0, heading=0)
-PARTS = [part.name for part in fields(STANDARD) if part.name != "push_interval"]
+# What the standard set leaves as in the model.
+OTHERS = {"damping": (1.2, 1.2), "joint_friction": (0.2, 0.2), "slope": (5.0, 5.0)}
+PARTS = [
+    part.name
+    for part in fields(STANDARD)
+    if part.name not in ("push_interval", *OTHERS)
+]
 
 
 @pytest.fixture
@@ -97,6 +103,9 @@ def test_the_standard_set_fills_what_is_not_given():
         ("payload", (-9.0, 0.0), "at least -3"),
         ("motor_strength", (0.9, 2.0), "at most 1.5"),
         ("latency", (0.0, 1.0), "at most 0.1"),
+        ("damping", (0.1, 1.0), "at least 0.5"),
+        ("joint_friction", (0.0, 2.0), "at most 0.5"),
+        ("slope", (-5.0, 5.0), "slope must be .* at least 0 and at most 30"),
         ("push", (0.0, np.inf), "push must be"),
         ("push_interval", (0.0, 1.0), "push_interval must be"),
         ("noise", -1.0, "noise must be 0 or more"),
@@ -107,6 +116,30 @@ def test_bad_ranges_are_one_sentence(name, value, message):
     with pytest.raises(InputError, match=message) as error:
         RandomizationConfig(**{name: value}).check()
     assert "\n" not in str(error.value)
+
+
+def test_weak_and_undamped_motors_are_refused_together(go2):
+    """.85 times .9 is below the .79 that the Go2's mass matrix allows."""
+    config = RandomizationConfig(motor_strength=(0.85, 1.0), damping=(0.9, 1.2))
+    with pytest.raises(InputError, match=r"at least 0\.79 .* not 0\.765"):
+        config.check(go2)
+    replace(config, damping=(0.95, 1.2)).check(go2)
+
+
+def test_parts_beyond_the_standard_set_leave_its_worlds_as_they_are(go2):
+    """They draw last, so the same seed gives the same friction, pushes and noise."""
+    more = replace(STANDARD, **OTHERS)
+    worlds = [
+        config.draw(go2, np.random.default_rng(5), 0.0, 10.0)
+        for config in (STANDARD, more)
+    ]
+    assert worlds[0].friction == worlds[1].friction
+    assert worlds[0].sensors.seed == worlds[1].sensors.seed
+    assert worlds[0].terrain is worlds[0].damping is None
+    assert worlds[0].joint_friction == 0.0
+    assert worlds[1].damping == 1.2
+    rise = np.linalg.norm(worlds[1].terrain.gradient)
+    assert rise == pytest.approx(np.tan(np.deg2rad(5.0)))
 
 
 def test_same_seed_same_episode_other_seed_another(plans):
@@ -121,7 +154,7 @@ def test_same_seed_same_episode_other_seed_another(plans):
     assert (one != other).any()
 
 
-@pytest.mark.parametrize("name", PARTS)
+@pytest.mark.parametrize("name", [*PARTS, *OTHERS])
 def test_each_part_alone_changes_what_happens(plans, name):
     """From the same start with the same actions; noise alone shows at once."""
 
@@ -135,16 +168,17 @@ def test_each_part_alone_changes_what_happens(plans, name):
         return start, batch.observe()[0]
 
     drawn = (0.02, 0.02) if name == "latency" else getattr(STANDARD, name)
+    drawn = OTHERS.get(name, drawn)
     part = RandomizationConfig(push_interval=(0.2, 0.2), **{name: drawn})
     start, end = observe(RandomizationConfig())
     other_start, other_end = observe(part)
     assert np.abs(end - other_end).max() > 1e-3
-    assert (start != other_start).any() == (name == "noise")
+    assert (start != other_start).any() == (name in ("noise", "slope"))
 
 
 def test_a_batch_does_what_the_diagram_does(plans, go2):
     """The same world, plan and actions in a diagram with a simulator of its own."""
-    randomization = replace(STANDARD, push_interval=(0.3, 0.4))
+    randomization = replace(STANDARD, push_interval=(0.3, 0.4), **OTHERS)
     config = EnvironmentConfig(reset_noise=NO_NOISE, randomization=randomization)
     batch = TrackingBatch(plans, config, 2)
     batch.reset(1, np.random.default_rng(1), 1, 0)
@@ -159,7 +193,7 @@ def test_a_batch_does_what_the_diagram_does(plans, go2):
         reference=PlanReference(),
         smoother=None,
         policy=ExternalAction(),
-        disturbances=STANDARD.disturbances,
+        disturbances=randomization.disturbances,
     )
     diagram = MakeLocomotionDiagram(scenario)
     simulator = MakeSimulator(diagram, scenario)
@@ -172,10 +206,7 @@ def test_a_batch_does_what_the_diagram_does(plans, go2):
     context.SetTime(25 * PLAN_DT)
     player = diagram.GetSubsystemByName("reference")
     player.SetPlan(player.GetMyMutableContextFromRoot(context), plans[0])
-    plant = diagram.GetSubsystemByName("plant")
-    plant.SetPositionsAndVelocities(
-        plant.GetMyMutableContextFromRoot(context), plans[0].state[25]
-    )
+    PlaceOnPlan(diagram, context)
     for k, action in enumerate(actions[:, 0]):
         diagram.GetInputPort("action").FixValue(context, action)
         simulator.AdvanceTo((26 + k) * PLAN_DT)
