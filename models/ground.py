@@ -1,6 +1,5 @@
 """Flat ground: a half space for contact and a chequered floor for display."""
 
-import numpy as np
 from pydrake.common import MemoryFile
 from pydrake.geometry import (
     AddContactMaterial,
@@ -13,16 +12,11 @@ from pydrake.geometry import (
     RoleAssign,
     SceneGraph,
 )
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
-from pydrake.multibody.tree import (
-    FixedOffsetFrame,
-    SpatialInertia,
-    world_model_instance,
-)
 from pydrake.systems.framework import Context
 
-from loco_drake.common.arrays import Array
+from .movable_ground import AddMovableGround, HasMovableGround, ground_shapes
 
 # Stiff enough that the feet determine the stiffness of the contact:
 # k = k_foot k_ground / (k_foot + k_ground).
@@ -30,9 +24,6 @@ _STIFFNESS = 1e9
 
 # Of the feet, s/m. A contact uses the mean of both, weighted by the other's stiffness.
 _FOOT_DISSIPATION = 1.0
-
-_GROUND = "ground"  # name of the shape
-_MOVABLE = "movable_ground"  # name of its model instance, body and frame
 
 TILE = 0.5  # m; shows at a glance how far and how fast a robot goes
 FLOOR_Z = -0.001  # m; a hair below 0, where Meshcat has a grid of its own
@@ -50,10 +41,8 @@ def AddGround(
 ) -> None:
     """Adds ground at z = 0 to a plant with a scene graph that is not finalized.
 
-    ``friction`` is Coulomb's coefficient, static and dynamic; ``visual`` adds a floor.
-    Ground that is ``movable`` is no part of the world's body but has one of its own,
-    which :func:`SetGradient` can incline. Drake ignores new poses of shapes that are
-    anchored to the world.
+    ``friction`` is Coulomb's coefficient, static and dynamic; ``visual`` adds a floor;
+    ``movable`` ground is that of :mod:`.movable_ground` instead of one half space.
     """
     properties = ProximityProperties()
     AddContactMaterial(
@@ -64,37 +53,19 @@ def AddGround(
     )
     # As AddContactMaterial does for "lagged" and "similar", leave damping to the feet.
     properties.AddProperty("material", "relaxation_time", 0.0)
-    body = plant.world_body()
     if movable:
-        instance = plant.AddModelInstance(_MOVABLE)
-        body = plant.AddRigidBody(_MOVABLE, instance, SpatialInertia.Zero())
-        frame = FixedOffsetFrame(_MOVABLE, plant.world_frame(), RigidTransform())
-        plant.WeldFrames(plant.AddFrame(frame), body.body_frame())
-    plant.RegisterCollisionGeometry(
-        body, RigidTransform(), HalfSpace(), _GROUND, properties
-    )
+        body = AddMovableGround(plant, properties)
+    else:
+        body = plant.world_body()
+        plant.RegisterCollisionGeometry(
+            body, RigidTransform(), HalfSpace(), "ground", properties
+        )
     if visual:
         floor = GeometryInstance(
             RigidTransform([0.0, 0.0, FLOOR_Z]), _floor().Clone(), "floor"
         )
         floor.set_illustration_properties(IllustrationProperties())
         plant.RegisterVisualGeometry(body, floor)
-
-
-def HasMovableGround(plant: MultibodyPlant) -> bool:
-    """Returns whether the plant's ground can be inclined."""
-    return bool(plant.HasModelInstanceNamed(_MOVABLE))
-
-
-def SetGradient(plant: MultibodyPlant, context: Context, gradient: Array) -> None:
-    """Inclines movable ground in the plant's Context, about the world's origin.
-
-    ``gradient`` is the rise of the ground per metre along x and y, shape (2,).
-    """
-    normal = np.array([-gradient[0], -gradient[1], 1.0])
-    R_WG = RotationMatrix.MakeFromOneVector(normal, axis_index=2)
-    frame = plant.GetFrameByName(_MOVABLE, world_model_instance())
-    frame.SetPoseInParentFrame(context, RigidTransform(R_WG, np.zeros(3)))
 
 
 def SetGround(
@@ -111,16 +82,16 @@ def SetGround(
     damping is set to the feet's, so that the damping of a contact does not change.
     """
     inspector = scene_graph.get_query_output_port().Eval(context).inspector()
-    body = plant.world_body()
     if HasMovableGround(plant):
-        body = plant.GetBodyByName(_MOVABLE)
-    # Users may have added their own shapes to the world.
-    (ground,) = (
-        shape
-        for shape in plant.GetCollisionGeometriesForBody(body)
-        if inspector.GetName(shape).split("::")[-1] == _GROUND
-    )
-    properties = ProximityProperties(inspector.GetProximityProperties(ground))
+        grounds = ground_shapes(plant)
+    else:
+        # Users may have added their own shapes to the world.
+        (ground,) = grounds = [
+            shape
+            for shape in plant.GetCollisionGeometriesForBody(plant.world_body())
+            if inspector.GetName(shape).split("::")[-1] == "ground"
+        ]
+    properties = ProximityProperties(inspector.GetProximityProperties(grounds[0]))
     if friction is not None:
         properties.UpdateProperty(
             "material", "coulomb_friction", CoulombFriction(friction, friction)
@@ -131,7 +102,8 @@ def SetGround(
             "material", "hunt_crossley_dissipation", _FOOT_DISSIPATION
         )
     source = plant.get_source_id()
-    scene_graph.AssignRole(context, source, ground, properties, RoleAssign.kReplace)
+    for ground in grounds:
+        scene_graph.AssignRole(context, source, ground, properties, RoleAssign.kReplace)
 
 
 def _floor() -> Mesh:

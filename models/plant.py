@@ -18,6 +18,7 @@ from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, check_choice, check_number
 
 from .ground import AddGround
+from .movable_ground import FilterMovableGround
 from .robots import AddRobotModel, Robot
 
 CONTACTS = ("similar", "lagged", "sap", "cenic")
@@ -97,7 +98,8 @@ def AddRobotPlant(
     stiffness robot.kp and the damping :func:`plant_damping`.
 
     With the contact "cenic" also call :func:`ConfigureSimulator`. ``pre_finalize`` may
-    add to the plant. ``movable_ground`` can be inclined, see :func:`.ground.AddGround`.
+    add to the plant. With ``movable_ground`` the ground is that of
+    :mod:`.movable_ground`.
 
     Returns:
         The plant, the scene graph and the robot's model instance.
@@ -135,6 +137,8 @@ def AddRobotPlant(
     )
     if pre_finalize is not None:
         pre_finalize(plant, scene_graph)
+    if movable_ground:
+        FilterMovableGround(plant, scene_graph)
     plant.Finalize()
     plant.SetDefaultPositions(
         instance,

@@ -19,8 +19,15 @@ from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.control.domain import MAX_LATENCY, Domain, draw_error, measure
 from loco_drake.control.plan import PLAN_DT
-from loco_drake.control.state import JOINT_VELOCITIES, JOINTS, split
-from loco_drake.models.ground import HasMovableGround, SetGradient, SetGround
+from loco_drake.control.state import JOINT_VELOCITIES, JOINTS, split, unit_base
+from loco_drake.control.terrain import Terrain, toes_in_world
+from loco_drake.models.ground import SetGround
+from loco_drake.models.movable_ground import (
+    HasMovableGround,
+    PlaceStep,
+    PlaceToePlanes,
+    TiltGround,
+)
 from loco_drake.models.parameters import (
     SetReflectedInertia,
     SetTrunkLoad,
@@ -253,12 +260,12 @@ def SetDomain(diagram: Diagram, context: Context, domain: Domain) -> None:
         contact = {"friction": domain.friction, "stiffness": domain.stiffness}
         SetGround(plant, scene_graph, ground, **contact)
     if "terrain" in present:
-        terrain = domain.terrain
-        SetGradient(
-            plant, plant_context, np.zeros(2) if terrain is None else terrain.gradient
-        )
+        level = Terrain(gradient=np.zeros(2))
+        terrain = domain.terrain or level
+        TiltGround(plant, plant_context, terrain.gradient)
+        PlaceStep(plant, plant_context, terrain.step, terrain.step_x)
         state = diagram.GetSubsystemByName("robot_state")
-        state.SetTerrain(state.GetMyMutableContextFromRoot(context), terrain)
+        state.SetTerrain(state.GetMyMutableContextFromRoot(context), domain.terrain)
     if domain.payload is not None or domain.com_shift is not None:
         trunk = plant.GetBodyByName(robot.trunk_frame, instance)
         shift = np.zeros(3) if domain.com_shift is None else domain.com_shift
@@ -273,3 +280,29 @@ def SetDomain(diagram: Diagram, context: Context, domain: Domain) -> None:
     for name in present - {"terrain"}:
         system = diagram.GetSubsystemByName(name)
         system.SetDomain(system.GetMyMutableContextFromRoot(context), domain)
+
+
+def FollowTerrain(diagram: Diagram, context: Context) -> None:
+    """Moves the ground under each toe to where the toe is, if the ground has bumps.
+
+    To be called at the start of each control period: no system can change parameters of
+    another. In a period of 20 ms a plane departs from the bumps by fractions of a mm
+    under a toe that stands, by a few mm under one that swings.
+    """
+    terrain = GetTerrain(diagram, context)
+    if terrain is None or terrain.roughness == 0:
+        return
+    robot, plant, instance = FindRobot(diagram)
+    plant_context = plant.GetMyMutableContextFromRoot(context)
+    q = unit_base(np.asarray(plant.GetPositions(plant_context, instance)))
+    p_WF = toes_in_world(robot, q)
+    heights, gradients = terrain.surface(p_WF[:, :2])
+    points = np.column_stack((p_WF[:, :2], heights))
+    PlaceToePlanes(plant, plant_context, points, gradients)
+
+
+def GetTerrain(diagram: Diagram, context: Context) -> Terrain | None:
+    """Returns the terrain of a locomotion diagram in its root's ``context``."""
+    state = diagram.GetSubsystemByName("robot_state")
+    terrain: Terrain | None = state.GetTerrain(state.GetMyContextFromRoot(context))
+    return terrain

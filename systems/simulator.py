@@ -11,10 +11,11 @@ from loco_drake.common.errors import InputError
 from loco_drake.control.domain import Domain
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.state import unit_base
+from loco_drake.models.movable_ground import HasMovableGround
 from loco_drake.models.plant import ConfigureSimulator
 
 from .control import FindRobot, PlanPlayer
-from .domain import SetDomain
+from .domain import FollowTerrain, GetTerrain, SetDomain
 from .scenario import Scenario
 
 _TOLERANCE = 1e-6  # of a control period; context times are sums of steps
@@ -25,13 +26,19 @@ class LocomotionSimulator(Simulator):
 
     Drake's discrete plants never normalize it, and no system can change the state of
     another. AdvanceTo therefore stops at the end of each control period and normalizes
-    the quaternion in the Context. The steps of the plant do not change. The diagram
-    contains systems of :func:`.diagram.AddLocomotion` at any depth.
+    the quaternion in the Context, and moves uneven ground under the toes. The steps of
+    the plant do not change. The diagram contains systems of
+    :func:`.diagram.AddLocomotion` at any depth.
     """
 
     def __init__(self, diagram: Diagram) -> None:
         super().__init__(diagram)
         self._robots = [FindRobot(part)[1:] for part in _locomotions(diagram)]
+        self._uneven = [
+            part
+            for part in _locomotions(diagram)
+            if HasMovableGround(FindRobot(part)[1])
+        ]
 
     def AdvanceTo(
         self, boundary_time: float, interruptible: bool = True
@@ -51,6 +58,8 @@ class LocomotionSimulator(Simulator):
             reached = status.reason() == status.ReturnReason.kReachedBoundaryTime
             if reached and until == period * PLAN_DT:
                 self._normalize(context)
+                for part in self._uneven:
+                    FollowTerrain(part, context)
             if not reached or until == boundary_time:
                 return status
 
@@ -202,13 +211,13 @@ def PlaceOnPlan(diagram: Diagram, root: Context) -> None:
     plan_state = diagram.GetSubsystemByName("plan_state")
     context = plan_state.GetMyContextFromRoot(root)
     state = plan_state.GetOutputPort("state").Eval(context)
-    robot_state = diagram.GetSubsystemByName("robot_state")
-    terrain = robot_state.GetTerrain(robot_state.GetMyContextFromRoot(root))
+    terrain = GetTerrain(diagram, root)
+    robot, plant, instance = FindRobot(diagram)
     if terrain is not None:
-        state = terrain.in_world(terrain.placed(state))
-    _, plant, instance = FindRobot(diagram)
+        state = terrain.in_world(terrain.placed(robot, state))
     context = plant.GetMyMutableContextFromRoot(root)
     plant.SetPositionsAndVelocities(context, instance, state)
+    FollowTerrain(diagram, root)
 
 
 def _locomotions(diagram: Diagram) -> Iterator[Diagram]:

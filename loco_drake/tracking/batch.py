@@ -82,7 +82,7 @@ class TrackingBatch:
             self._robot, random, sample * PLAN_DT, self._last[i] * PLAN_DT
         )
         if domain.terrain is not None:
-            self._state[i] = domain.terrain.placed(self._state[i])
+            self._state[i] = domain.terrain.placed(self._robot, self._state[i])
         self._domains[i] = domain
         self._worlds[i].begin(domain, sample)
 

@@ -15,7 +15,7 @@ from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.terrain import Terrain
 from loco_drake.models.plant import ConfigureSimulator, PlantConfig
 from loco_drake.systems.diagram import MakeLocomotionDiagram
-from loco_drake.systems.domain import SetDomain
+from loco_drake.systems.domain import FollowTerrain, SetDomain
 from loco_drake.systems.scenario import Disturbances, ExternalTargets, Scenario
 from loco_drake.tracking.config import EnvironmentConfig
 
@@ -128,8 +128,11 @@ class OwnWorld(_Simulation):
 
     def advance(self, state: Array, desired_state: Array) -> Array:
         """Returns the state after a control period; see :class:`SharedWorld`."""
-        terrain = self._terrain
-        self._set(state if terrain is None else terrain.in_world(state), desired_state)
         self._sample += 1
-        state = self._advance(self._sample * PLAN_DT)
-        return state if terrain is None else terrain.over_ground(state)
+        terrain, end = self._terrain, self._sample * PLAN_DT
+        if terrain is None:
+            self._set(state, desired_state)
+            return self._advance(end)
+        self._set(terrain.in_world(state), desired_state)
+        FollowTerrain(self._diagram, self._context)
+        return terrain.over_ground(self._advance(end))

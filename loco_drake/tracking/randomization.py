@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError, check_bounds
 from loco_drake.control.domain import BOUNDS, Domain, Push, SensorErrors, error_vector
-from loco_drake.control.terrain import MAX_SLOPE, slope
+from loco_drake.control.terrain import (
+    MAX_ROUGHNESS,
+    MAX_SLOPE,
+    Terrain,
+    slope_gradient,
+)
 
 # Commands have these ranges as options; their --help does not wait for Drake.
 if TYPE_CHECKING:
@@ -74,6 +79,8 @@ class RandomizationConfig:
     joint_friction: tuple[float, float] | None = None
     # Incline of the ground in degrees, in a random direction.
     slope: tuple[float, float] | None = None
+    # Height range of smooth bumps of the ground, m.
+    roughness: tuple[float, float] | None = None
     # Sensor errors, as a multiple of the standard deviations in docs/tracking.md.
     noise: float | None = None
 
@@ -89,7 +96,7 @@ class RandomizationConfig:
 
         limits = {**BOUNDS, "push": (0.0, inf), "push_interval": (PUSH_DURATION, inf)}
         limits["motor_strength"] = limits.pop("strength")
-        limits["slope"] = (0.0, MAX_SLOPE)
+        limits |= {"slope": (0.0, MAX_SLOPE), "roughness": (0.0, MAX_ROUGHNESS)}
         for name, (least, most) in limits.items():
             bounds = getattr(self, name)
             if bounds is None:
@@ -129,7 +136,7 @@ class RandomizationConfig:
             ),
             pushes=self.push is not None,
             sensors=self.noise is not None,
-            terrain=self.slope is not None,
+            terrain=not (self.slope is self.roughness is None),
         )
 
     @property
@@ -179,9 +186,22 @@ class RandomizationConfig:
             ),
             damping=uniform(self.damping),
             joint_friction=uniform(self.joint_friction) or 0.0,
-            terrain=None
-            if self.slope is None
-            else slope(uniform(self.slope), random.uniform(-np.pi, np.pi)),
+            terrain=self._draw_terrain(random),
+        )
+
+    def _draw_terrain(self, random: np.random.Generator) -> Terrain | None:
+        if self.slope is self.roughness is None:
+            return None
+        gradient = np.zeros(2)
+        if self.slope is not None:
+            degrees = random.uniform(*self.slope)
+            gradient = slope_gradient(degrees, random.uniform(-np.pi, np.pi))
+        if self.roughness is None:
+            return Terrain(gradient=gradient)
+        return Terrain(
+            gradient=gradient,
+            roughness=random.uniform(*self.roughness),
+            seed=int(random.integers(2**32)),
         )
 
     def _draw_pushes(

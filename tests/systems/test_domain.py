@@ -11,16 +11,16 @@ from pydrake.systems.framework import DiagramBuilder
 from loco_drake.common.errors import InputError
 from loco_drake.control.domain import Domain, Push, SensorErrors
 from loco_drake.control.plan import PLAN_DT
-from loco_drake.control.terrain import slope
+from loco_drake.control.terrain import Terrain, slope_gradient, toes_in_world
 from loco_drake.models.plant import (
     CONTACTS,
     ConfigureSimulator,
     PlantConfig,
     plant_damping,
 )
-from loco_drake.models.robots import AddRobotModel
+from loco_drake.models.robots import AddRobotModel, get_robot
 from loco_drake.systems.diagram import MakeLocomotionDiagram
-from loco_drake.systems.domain import SetDomain
+from loco_drake.systems.domain import FollowTerrain, SetDomain
 from loco_drake.systems.scenario import (
     Disturbances,
     ExternalAction,
@@ -28,11 +28,16 @@ from loco_drake.systems.scenario import (
     PlanReference,
     Scenario,
 )
+from loco_drake.systems.simulator import MakeSimulator, StartEpisode
 
 ALL = Disturbances(actuation=True, pushes=True, sensors=True, terrain=True)
 GRAVITY = 9.81
 GO2_MASS, GO2_TRUNK = 16.085, 7.277  # kg, as in its URDF
 FAR_UP = 50.0  # m
+
+
+def incline(degrees, direction):
+    return Terrain(gradient=slope_gradient(degrees, direction))
 
 
 class Standing:
@@ -281,7 +286,7 @@ def test_joints_with_the_largest_friction_come_to_rest(go2):
 @pytest.mark.parametrize("contact", ["similar", "cenic"])
 def test_a_robot_slides_down_a_steep_slope_as_physics_says(go2, contact):
     """20 degrees with .178: g (sin - .178 cos) along the slope, here along -x."""
-    terrain = slope(20.0, 0.0)
+    terrain = incline(20.0, 0.0)
     plant = PlantConfig(contact=contact)
     robot = Standing(go2, Domain(friction=0.1, terrain=terrain), plant)
     place(robot, terrain)
@@ -296,7 +301,7 @@ def test_a_robot_slides_down_a_steep_slope_as_physics_says(go2, contact):
 
 
 def test_a_robot_stands_on_a_slope_and_its_height_is_that_over_the_ground(go2):
-    terrain = slope(8.0, 0.7)
+    terrain = incline(8.0, 0.7)
     robot = Standing(go2, Domain(terrain=terrain))
     place(robot, terrain, at=(3.0, -1.0))
     robot.advance(1.0)
@@ -310,12 +315,68 @@ def test_a_robot_stands_on_a_slope_and_its_height_is_that_over_the_ground(go2):
     assert z > 0.5
 
 
+def test_feet_rest_on_the_bumps_under_them(go2):
+    """The lowest points of the toe spheres, from the joints, against the surface."""
+    terrain = Terrain(gradient=np.array([0.05, 0.0]), roughness=0.04, seed=3)
+    robot = Standing(go2, Domain(terrain=terrain))
+    place(robot, terrain, at=(2.0, 1.0))
+    for k in range(1, 101):
+        FollowTerrain(robot.diagram, robot.context)
+        robot.advance(k * PLAN_DT)
+    assert len(robot.contacts[0]) == 4
+    toes = toes_in_world(go2, robot.state[:19])
+    heights, gradients = terrain.surface(toes[:, :2])
+    assert np.ptp(heights - toes[:, 0] * 0.05) > 0.01
+    cosines = 1 / np.sqrt(1 + (gradients**2).sum(axis=1))
+    gaps = (toes[:, 2] - heights) * cosines - go2.foot_radius
+    np.testing.assert_allclose(gaps, 0.0, atol=0.003)
+
+
+def test_a_step_carries_whoever_stands_on_it(go2):
+    """Beyond the edge at 1 m the ground is 5 cm higher, and so is the base."""
+    terrain = Terrain(gradient=np.zeros(2), step=0.05)
+    for x, raised in ((0.5, 0.0), (2.0, 0.05)):
+        robot = Standing(go2, Domain(terrain=terrain))
+        place(robot, terrain, at=(x, 0.0))
+        robot.advance(1.0)
+        height = robot.diagram.GetOutputPort("state").Eval(robot.context)[6]
+        assert robot.state[6] - raised == pytest.approx(height)
+        assert height == pytest.approx(go2.stand_height, abs=0.02)
+        forces, points, _ = robot.contacts
+        assert forces[:, 2].sum() == pytest.approx(GO2_MASS * GRAVITY, rel=0.02)
+        np.testing.assert_allclose(points[:, 2], raised, atol=2e-3)
+
+
+def test_a_simulator_moves_the_ground_at_every_control_period(go2):
+    """Bit for bit as with one call a period, however AdvanceTo is called."""
+    scenario = Scenario(
+        reference=PlanReference(),
+        smoother=None,
+        policy=ExternalAction(),
+        disturbances=Disturbances(terrain=True),
+    )
+    diagram = MakeLocomotionDiagram(scenario)
+    domain = Domain(terrain=Terrain(gradient=np.zeros(2), roughness=0.04, seed=1))
+    ends = []
+    for times in ([0.5], [0.013, 0.2, 0.47, 0.5], np.arange(1, 26) * PLAN_DT):
+        simulator = MakeSimulator(diagram, scenario)
+        context = simulator.get_mutable_context()
+        diagram.GetInputPort("action").FixValue(context, np.full(12, 0.5))
+        StartEpisode(simulator, domain=domain)
+        for time in times:
+            simulator.AdvanceTo(time)
+        ends.append(diagram.GetOutputPort("state").Eval(context).copy())
+    np.testing.assert_array_equal(ends[0], ends[1])
+    np.testing.assert_array_equal(ends[0], ends[2])
+
+
 def place(robot, terrain, at=(0.0, 0.0)):
     """Puts a standing robot on the slope."""
     state = robot.state
     state[4:6] = at
-    state = terrain.in_world(terrain.placed(state))
+    state = terrain.in_world(terrain.placed(get_robot("go2"), state))
     robot.plant.SetPositionsAndVelocities(robot.plant_context, state)
+    FollowTerrain(robot.diagram, robot.context)
 
 
 def _with_scaled_gains(go2, contact, strength, damping=1.0):
@@ -385,7 +446,7 @@ def test_a_domain_like_the_model_changes_nothing(go2):
         ("actuation", Domain(strength=np.ones(12))),
         ("actuation", Domain(damping=1.1)),
         ("actuation", Domain(joint_friction=0.1)),
-        ("terrain", Domain(terrain=slope(5.0, 0.0))),
+        ("terrain", Domain(terrain=incline(5.0, 0.0))),
         ("pushes", Domain(pushes=(Push(start=0, duration=1, force_W=np.ones(3)),))),
         (
             "sensors",
@@ -416,7 +477,7 @@ def test_all_of_it_is_in_the_context(go2):
         strength=np.linspace(0.9, 1.1, 12),
         damping=1.1,
         joint_friction=0.2,
-        terrain=slope(4.0, 2.0),
+        terrain=Terrain(gradient=slope_gradient(4.0, 2.0), roughness=0.01, step=0.02),
         latency=0.02,
         pushes=(Push(start=0.2, duration=0.1, force_W=np.array([60.0, 0, 0])),),
     )

@@ -30,7 +30,12 @@ from loco_drake.tracking.randomization import (
 
 NO_NOISE = ResetNoise(joints=0, velocities=0, position=0, heading=0)
 # What the standard set leaves as in the model.
-OTHERS = {"damping": (1.2, 1.2), "joint_friction": (0.2, 0.2), "slope": (5.0, 5.0)}
+OTHERS = {
+    "damping": (1.2, 1.2),
+    "joint_friction": (0.2, 0.2),
+    "slope": (5.0, 5.0),
+    "roughness": (0.02, 0.02),
+}
 PARTS = [
     part.name
     for part in fields(STANDARD)
@@ -106,6 +111,7 @@ def test_the_standard_set_fills_what_is_not_given():
         ("damping", (0.1, 1.0), "at least 0.5"),
         ("joint_friction", (0.0, 2.0), "at most 0.5"),
         ("slope", (-5.0, 5.0), "slope must be .* at least 0 and at most 30"),
+        ("roughness", (0.0, 1.0), "at most 0.1"),
         ("push", (0.0, np.inf), "push must be"),
         ("push_interval", (0.0, 1.0), "push_interval must be"),
         ("noise", -1.0, "noise must be 0 or more"),
@@ -173,7 +179,7 @@ def test_each_part_alone_changes_what_happens(plans, name):
     start, end = observe(RandomizationConfig())
     other_start, other_end = observe(part)
     assert np.abs(end - other_end).max() > 1e-3
-    assert (start != other_start).any() == (name in ("noise", "slope"))
+    assert (start != other_start).any() == (name in ("noise", "slope", "roughness"))
 
 
 def test_a_batch_does_what_the_diagram_does(plans, go2):
