@@ -6,6 +6,7 @@ from typing import Any
 
 from loco_drake.cli.evaluation import Evaluation, print_by_label
 from loco_drake.cli.output import MARK, print_failed, print_warnings, tracked
+from loco_drake.common.errors import check_choice
 
 
 @dataclass(kw_only=True)
@@ -24,6 +25,8 @@ class EvaluateRetargeting(Evaluation):
     mirror: bool = False
     # Scale time to keep the animal's Froude number, as `retarget --froude` does.
     froude: bool = False
+    # Make motion obey physics, as `retarget --ground` does.
+    ground: bool = False
     # Exit with status 1 if a figure of a clip is outside its bounds.
     strict: bool = False
 
@@ -39,12 +42,17 @@ class EvaluateRetargeting(Evaluation):
         from loco_drake.datasets.segments import read_segments, select_labels
         from loco_drake.evaluation.retargeting import score_segments, summarize
         from loco_drake.models.robot_files import load_robot
+        from loco_drake.models.robots import ROBOTS
         from loco_drake.retargeting.scaling import Variant
 
         segments = select_labels(read_segments(data_dir(self.data_dir)), self.labels)
-        variant = Variant(mirror=self.mirror, froude=self.froude)
+        variant = Variant(mirror=self.mirror, froude=self.froude, ground=self.ground)
         robots = {}
-        for robot in [load_robot(name) for name in names]:
+        loaded = [load_robot(name) for name in names]
+        if self.ground:
+            for robot in loaded:
+                check_choice("robot to ground", robot.name, ROBOTS)
+        for robot in loaded:
             start = time.perf_counter()
             scores = score_segments(segments, robot, self.workers, variant)
             what = f"Retargeting to {robot.name}"

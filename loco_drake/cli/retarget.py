@@ -1,7 +1,7 @@
 """The command ``retarget``."""
 
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,8 +52,11 @@ class Retarget:
     # Scale time to keep the animal's Froude number, v^2 / (g h): a robot a quarter as
     # high as the animal moves in half the time. Default: keep the animal's timing.
     froude: bool = False
-    # Folder for the Motion files. Default: motions/ROBOT, with the suffixes -mirrored
-    # and -froude for these options.
+    # Move the trunk, by some mm and degrees, so that the feet's forces can explain its
+    # motion: in flight it falls, on the ground friction suffices. For go2 and a1.
+    ground: bool = False
+    # Folder for the Motion files. Default: motions/ROBOT, with the suffixes -mirrored,
+    # -froude and -grounded for these options.
     out: Path | None = None
     # Number of 2 s trajectories for each of the fifteen labels, at most; 0 for none.
     # None are cut with FILE.
@@ -88,10 +91,12 @@ class Retarget:
         check_at_least("steer", self.steer, 0)
         if self.steer:
             check_choice("robot to steer", robot.name, ROBOTS)
+        if self.ground:
+            check_choice("robot to ground", robot.name, ROBOTS)
         if self.source is not None:
             check_choice("source", self.source, DATASETS)
         segments, split = self._segments()
-        variant = Variant(mirror=self.mirror, froude=self.froude)
+        variant = Variant(mirror=self.mirror, froude=self.froude, ground=self.ground)
         out = self.out or Path("motions") / f"{robot.name}{variant.suffix}"
         done = retarget_segments(segments, robot, out, split, self.workers, variant)
         outcomes = list(output.tracked(done, "Retargeting", len(segments)))
@@ -101,9 +106,13 @@ class Retarget:
         output.write_json(self.json, {o.segment.name: _figures(o) for o in outcomes})
         reports = {o.segment.name: o.report for o in outcomes if o.report is not None}
         doubtful = {name: r.warnings for name, r in reports.items() if r.warnings}
-        rows = [[k + MARK * (k in doubtful), *_cells(r)] for k, r in reports.items()]
+        columns = _COLUMNS | (_GROUNDED if self.ground else {})
+        rows = [
+            [k + MARK * (k in doubtful), *_cells(r, columns)]
+            for k, r in reports.items()
+        ]
         title = f"Motion files in {out}: {len(rows)}{', mirrored' * self.mirror}"
-        print_table(title, ["clip", *_COLUMNS], rows)
+        print_table(title, ["clip", *columns], rows)
         output.print_warnings(doubtful)
         self._steer(robot.name, outcomes, split)
         if split is not None and self.trajectories:
@@ -119,6 +128,7 @@ class Retarget:
         from loco_drake.datasets.split import VALIDATION
         from loco_drake.models.robots import get_robot
         from loco_drake.motion.motion_file import load_motion, save_motion
+        from loco_drake.retargeting.grounding import ground
 
         written = 0
         for number, outcome in enumerate(outcomes if self.steer else []):
@@ -129,7 +139,10 @@ class Retarget:
             for k in range(self.steer):
                 seed = (self.seed, number, k)
                 path = outcome.path.with_stem(f"{outcome.path.stem}-steered{k}")
-                save_motion(steered_motion(get_robot(robot), motion, seed), path)
+                steered = steered_motion(get_robot(robot), motion, seed)
+                if self.ground:
+                    steered = ground(steered, get_robot(robot)).motion
+                save_motion(steered, path)
                 written += 1
         if self.steer:
             print(f"Steered variants: {written}.")
@@ -182,7 +195,7 @@ class Retarget:
 def _figures(outcome: "Outcome") -> dict[str, object]:
     if outcome.report is None:
         return {"error": outcome.error}
-    return {**asdict(outcome.report), "path": str(outcome.path)}
+    return {**outcome.report.figures, "path": str(outcome.path)}
 
 
 # Title to key, factor and digits.
@@ -197,8 +210,17 @@ _COLUMNS = {
     "toe error mm": ("toe_error_rmse_m", 1e3, 2),
     "correction mm": ("correction_rmse_m", 1e3, 2),
 }
+_GROUNDED = {
+    "off fall m/s2": ("free_fall_error_mps2", 1.0, 2),
+    "momentum error": ("momentum_error", 1.0, 3),
+    "toes moved mm": ("ground_correction_rmse_m", 1e3, 1),
+    "joints moved rad": ("joint_correction_rmse_rad", 1.0, 3),
+}
 
 
-def _cells(report: "RetargetReport") -> list[str]:
-    values = [(getattr(report, key), by, n) for key, by, n in _COLUMNS.values()]
+def _cells(
+    report: "RetargetReport", columns: dict[str, tuple[str, float, int]]
+) -> list[str]:
+    figures = report.figures
+    values = [(figures[key], by, n) for key, by, n in columns.values()]
     return ["-" if x is None else f"{x * by:.{digits}f}" for x, by, digits in values]

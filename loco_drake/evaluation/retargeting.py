@@ -17,6 +17,8 @@ stride_period_error, phase_lag_error, duty_factor_error
 clips                    their number; those that failed are not counted
 frames_per_second        frames of motion over seconds of computing in one process,
                          reading excluded
+figures of grounding     root of the mean square over all frames of all clips that have
+                         the figure; only if motion is grounded
 ======================== ==============================================================
 """
 
@@ -194,6 +196,17 @@ def figures(clips: Sequence[ClipScore]) -> dict[str, Any]:
         squares = np.array([getattr(report, key) ** 2 for report in reports])
         return float(np.sqrt(squares @ frames / frames.sum())) if reports else None
 
+    def pooled_grounding(key: str) -> float | None:
+        found = [
+            (value, report.frames)
+            for report in reports
+            if (value := getattr(report.grounding, key)) is not None
+        ]
+        if not found:
+            return None
+        values, weights = np.array(found, dtype=np.float64).T
+        return float(np.sqrt(np.average(values**2, weights=weights)))
+
     def worst(key: str) -> float | None:
         return worst_clips[key]["value"] if reports else None
 
@@ -209,6 +222,9 @@ def figures(clips: Sequence[ClipScore]) -> dict[str, Any]:
     for key in _FIDELITY:
         values = [getattr(fidelity, key) for fidelity in fidelities]
         result[key] = float(np.mean(values)) if values else None
+    if reports and reports[0].grounding is not None:
+        for key in vars(reports[0].grounding):
+            result[key] = pooled_grounding(key)
     result["clips"] = len(clips)
     result["clips_outside_bounds"] = sum(bool(r.warnings) for r in reports)
     result["clips_of_three_strides"] = len(fidelities)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from loco_drake.datasets.segments import Segment
 from loco_drake.datasets.split import Split
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.models.robot_files import load_robot
+from loco_drake.models.robots import get_robot
 from loco_drake.motion import quality
 from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.keypoints import KeypointClip
@@ -29,6 +31,11 @@ from loco_drake.retargeting.contacts import (
     track_width,
 )
 from loco_drake.retargeting.correction import correct
+from loco_drake.retargeting.grounding import (
+    GroundingReport,
+    ground,
+    grounding_report,
+)
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.scaling import (
     AS_RECORDED,
@@ -76,6 +83,13 @@ class RetargetReport:
     unsolved_frames: int  # for which inverse kinematics found no solution
     # A sentence for each figure outside its bound, see bounds.
     warnings: tuple[str, ...] = ()
+    grounding: GroundingReport | None = None  # None if the motion was not grounded
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """The figures by name, those of grounding, if there are any, among them."""
+        figures = asdict(self)
+        return figures | (figures.pop("grounding") or {})
 
 
 def retarget_clip(
@@ -118,6 +132,11 @@ def retarget_clip(
         contacts=contacts,
         provenance=timed.provenance,
     )
+    grounding = None
+    if variant.ground:
+        before = motion
+        motion, solved = ground(before, get_robot(robot.name), solver)
+        grounding = grounding_report(before, motion, get_robot(robot.name))
     seconds = time.perf_counter() - began
     p_WF = quality.toe_trajectories(motion, robot)
     standing = None if config.stance_height is not None else on_feet(clip)
@@ -126,24 +145,33 @@ def retarget_clip(
         frames_per_second=len(motion) / seconds,
         toe_error_rmse_m=quality.distance_rmse(p_WF, targets.p_WF),
         correction_rmse_m=quality.distance_rmse(targets.p_WF, formula.p_WF),
-        trunk_correction_rmse_m=quality.distance_rmse(targets.p_WB, formula.p_WB),
+        trunk_correction_rmse_m=quality.distance_rmse(
+            motion.base_position, formula.p_WB
+        ),
         stance_slip_median_mps=quality.stance_slip_median(p_WF, robot.foot_radius, FPS),
         penetration_max_m=quality.penetration_max(p_WF, robot.foot_radius),
-        joint_limit_violations=quality.joint_limit_violations(joints, robot),
-        joint_speed_ratio_max=quality.joint_speed_ratio_max(joints, robot, FPS),
+        joint_limit_violations=quality.joint_limit_violations(
+            motion.joint_positions, robot
+        ),
+        joint_speed_ratio_max=quality.joint_speed_ratio_max(
+            motion.joint_positions, robot, FPS
+        ),
         scale=scale,
         time_scale=time_scale,
         mirrored=variant.mirror,
         on_feet_share=None if standing is None else float(standing.mean()),
         on_feet_frames=None if standing is None else frames_on_feet(clip, standing),
         trunk_height_ratio=float(np.median(clip.middle[:, 2]) / height),
-        toes_in_place_share=quality.toes_in_place_share(joints, robot),
+        toes_in_place_share=quality.toes_in_place_share(motion.joint_positions, robot),
         source_track_m=track_width(clip),
         unsolved_frames=int((~solved).sum()),
+        grounding=grounding,
     )
     report = replace(report, warnings=outside_bounds(asdict(report), robot))
     kept = ("scale", "toe_error_rmse_m", "correction_rmse_m")
-    figures = {name: f"{getattr(report, name):.6g}" for name in kept}
+    told = {name: getattr(report, name) for name in kept}
+    told |= vars(grounding) if grounding else {}
+    figures = {k: f"{x:.6g}" for k, x in told.items() if x is not None}
     if report.warnings:
         figures["warnings"] = "; ".join(report.warnings)
     return replace(motion, provenance={**motion.provenance, **figures}), report

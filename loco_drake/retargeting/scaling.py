@@ -220,11 +220,14 @@ class Variant:
 
     mirror: bool = False  # whether left and right are exchanged
     froude: bool = False  # whether time is scaled for the animal's Froude number
+    # Whether the trunk is moved so that the motion obeys physics, see grounding.
+    ground: bool = False
 
     @property
     def suffix(self) -> str:
-        """Suffix of a folder with such motion: "-mirrored-froude"."""
-        return "-mirrored" * self.mirror + "-froude" * self.froude
+        """Suffix of a folder with such motion: "-mirrored-froude-grounded"."""
+        parts = {"-mirrored": self.mirror, "-froude": self.froude}
+        return "".join(k * v for k, v in parts.items()) + "-grounded" * self.ground
 
     def time_scale(self, scale: float) -> float:
         """Returns the duration of the motion over that of the recording.

@@ -116,3 +116,24 @@ def test_clips_outside_their_bounds_are_marked_and_strict_fails(
         result = json.loads((tmp_path / "a.json").read_text())["robots"]["go2"]
         assert list(result["warnings"]) == [bad]
         assert result["labels"]["dog-pace"]["clips_outside_bounds"] == 1
+
+
+def test_figures_of_grounding_are_those_of_grounded_motion_only(made_data, tmp_path):
+    options = ("--data-dir", made_data, "--labels", "dog-trot")
+    assert command(*options, "--json", tmp_path / "a.json").run() == 0
+    assert command(*options, "--ground", "--json", tmp_path / "b.json").run() == 0
+    plain, grounded = (
+        json.loads((tmp_path / name).read_text()) for name in ("a.json", "b.json")
+    )
+    assert (plain["ground"], grounded["ground"]) == (False, True)
+    before = plain["robots"]["go2"]["labels"]["dog-trot"]
+    after = grounded["robots"]["go2"]["labels"]["dog-trot"]
+    assert "momentum_error" not in before
+    assert after["momentum_error"] < 0.2 * after["momentum_error_before"]
+    # Rhythm, slip and limits are those of the motion as it was.
+    for key in ("stride_period_error", "phase_lag_error", "duty_factor_error"):
+        assert after[key] == pytest.approx(before[key], abs=2e-3)
+    assert after["stance_slip_median_mps"] < 1e-3
+    assert after["joint_limit_violations"] == 0
+    with pytest.raises(InputError, match=r"robot to ground.*choices are go2, a1"):
+        command(*options, "--robot", SOLO8, "--ground").run()

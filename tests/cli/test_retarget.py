@@ -8,6 +8,7 @@ from loco_drake.cli.retarget import Retarget
 from loco_drake.common.errors import InputError
 from loco_drake.models.robot_files import load_robot
 from loco_drake.models.robots import get_robot
+from loco_drake.motion.momentum import momentum_error
 from loco_drake.motion.motion_file import load_motion
 from tests.robot_files import SOLO8
 from tests.synthetic import write_dog_recording, write_lying_dog
@@ -338,3 +339,26 @@ def test_data_without_one_of_the_fifteen_gaits_says_how_to_retarget_it(
         command("--data-dir", tmp_path, "--out", tmp_path).run()
     walk = ("--data-dir", tmp_path, "--gait", "walk", "--out", tmp_path)
     assert command(*walk, "--trajectories", 0).run() == 0
+
+
+def test_grounded_motion_goes_to_a_folder_of_its_own(
+    made_data, tmp_path, monkeypatch, capsys
+):
+    """With its price in the JSON file and the table; other robots have no masses."""
+    monkeypatch.chdir(tmp_path)
+    options = ("--data-dir", made_data, "--gait", "trot", "--trajectories", 0)
+    assert command(*options, "--ground", "--json", "a.json", "--steer", 1).run() == 0
+    folder = tmp_path / "motions" / "go2-grounded"
+    name = "dog-trot-made_trot-0-240"
+    figures = json.loads((tmp_path / "a.json").read_text())[name]
+    assert figures["momentum_error"] < 0.2 * figures["momentum_error_before"]
+    assert 0 < figures["ground_correction_rmse_m"] < 0.025
+    assert "grounding" not in figures
+    told = load_motion(folder / f"{name}.npz").provenance["momentum_error"]
+    assert float(told) == pytest.approx(figures["momentum_error"], rel=1e-5)
+    assert "moved" in capsys.readouterr().out
+    robot = get_robot("go2")
+    for steered in folder.glob("*-steered0.npz"):
+        assert momentum_error(load_motion(steered), robot) < 0.1
+    with pytest.raises(InputError, match=r"robot to ground.*choices are go2, a1"):
+        command(*options, "--robot", SOLO8, "--ground").run()
