@@ -26,6 +26,7 @@ _COMMANDS = {
     "train tokenizer": "train the VQ-VAE that encodes motion",
     "train generator": "train the GPT that generates tokens",
     "train tracker": "train the tracking policy with PPO",
+    "train recipe": "train a tracking policy from nothing, in stages",
     "train classifier": "train the transformer that classifies gaits",
     "export": "write a policy, a plan or a robot for use without Drake",
     "evaluate retargeting": "measure retargeted motion",
@@ -103,7 +104,8 @@ def _run(arguments: list[str]) -> int:
     for option in _OUTPUTS:
         into = option == "figures" or (option == "out" and name not in _ONE_FILE)
         check_writable(getattr(parsed, option, None), folder=into)
-    if getattr(parsed, "resume", False):
+    # A recipe's options are in its folder, not in one checkpoint.
+    if getattr(parsed, "resume", False) and name != "train recipe":
         from loco_drake.cli.training import parse_resumed
 
         parsed = parse_resumed(parsed, prog, rest)

@@ -1,6 +1,5 @@
 """Output of commands: tables for people, JSON for programs."""
 
-import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ from rich.progress import track
 from rich.table import Table
 from rich.text import Text
 
+from loco_drake.common import files
 from loco_drake.common.errors import one_line
 from loco_drake.common.files import atomic_path, figures_sha256
 
@@ -24,8 +24,7 @@ Item = TypeVar("Item")
 def write_json(path: Path | None, figures: dict[str, Any]) -> None:
     """Writes a command's figures to ``path``; None writes nothing."""
     if path is not None:
-        with atomic_path(path) as temporary:
-            temporary.write_text(json.dumps(figures, indent=2) + "\n")
+        files.write_json(path, figures)
 
 
 def write_figure(figure: "Figure", path: Path, dpi: int = 120) -> None:

@@ -160,6 +160,12 @@ def read_json(path: Path) -> dict[str, Any]:
         raise InputError(f"{path} is damaged: it is not JSON ({reason}).") from None
 
 
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Writes a JSON object, atomically."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=2) + "\n")
+
+
 def read_text(path: Path) -> str:
     r"""Returns a text file, UTF-8 or with the mark of UTF-16, lines ending in ``\n``.
 

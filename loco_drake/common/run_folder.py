@@ -103,6 +103,24 @@ def open_run(
             it is damaged, or it does not match ``run``.
     """
     check_folder(folder, weights, resume)
+    with locked(folder):
+        check_folder(folder, weights, resume)
+        saved = read_checkpoint(folder / CHECKPOINT, name) if resume else None
+        if saved is not None:
+            check_same(saved, run, settings(options), steps)
+        for unfinished in folder.glob(".*.safetensors"):
+            unfinished.unlink()  # left by a training that was killed
+        header = {"run": dict(run), "options": dict(options)}
+        yield RunFolder(folder / CHECKPOINT, f"{name} checkpoint", header, saved)
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Holds the lock of a folder, which is created if it does not exist.
+
+    Raises:
+        InputError: if another process holds it.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     handle = os.open(folder, os.O_RDONLY)
     try:
@@ -114,14 +132,7 @@ def open_run(
                 f"Another training is at work in {str(folder)!r}; stop it first, or "
                 "name another folder with --out."
             ) from None
-        check_folder(folder, weights, resume)
-        saved = read_checkpoint(folder / CHECKPOINT, name) if resume else None
-        if saved is not None:
-            check_same(saved, run, settings(options), steps)
-        for unfinished in folder.glob(".*.safetensors"):
-            unfinished.unlink()  # left by a training that was killed
-        header = {"run": dict(run), "options": dict(options)}
-        yield RunFolder(folder / CHECKPOINT, f"{name} checkpoint", header, saved)
+        yield
     finally:
         os.close(handle)
 

@@ -21,20 +21,30 @@ def smooth_motions(robot: Robot, motions: Iterable[Motion]) -> list[Plan]:
     return [smooth_plan(robot, plan, limits) for plan in plans]
 
 
-def load_references(robot: Robot, folder: Path) -> list[Plan]:
-    """Returns the Motion files in ``folder`` as plans, re-timed by the smoother.
+def read_motions(robot: Robot, folder: Path) -> dict[Path, Motion]:
+    """Returns the Motion files in ``folder``, in the order of their names.
 
     Raises:
         InputError: if there are none, or one is of another robot.
     """
-    paths = sorted(Path(folder).glob("*.npz"))
+    # Hidden files are left by a process that was killed.
+    paths = sorted(Path(folder).glob("[!.]*.npz"))
     if not paths:
         raise InputError(f"There are no Motion files (*.npz) in {str(folder)!r}.")
-    motions = [load_motion(path) for path in paths]
-    for path, motion in zip(paths, motions, strict=True):
+    motions = {path: load_motion(path) for path in paths}
+    for path, motion in motions.items():
         if motion.robot != robot.name:
             raise InputError(f"{path} is of {motion.robot}, not of {robot.name}.")
-    return smooth_motions(robot, motions)
+    return motions
+
+
+def load_references(robot: Robot, folder: Path) -> list[Plan]:
+    """Returns the Motion files in ``folder`` as plans, re-timed by the smoother.
+
+    Raises:
+        InputError: as :func:`read_motions`.
+    """
+    return smooth_motions(robot, read_motions(robot, folder).values())
 
 
 def generate_references(

@@ -87,7 +87,9 @@ def train_tracker(
     own = run_folder.options_of(config)
     own = {field.name: own[field.name] for field in fields(TrainingConfig)}
     run = {
-        **run_folder.settings(own, "steps"),
+        # Not how many processes share the environments: results are the same.
+        **run_folder.settings(own, "steps", "workers", "per_worker"),
+        "environments": config.workers * config.per_worker,
         "references": f"{len(plans)} motions of {sum(map(len, plans))} samples",
         "observation_layout": LAYOUT,
     }

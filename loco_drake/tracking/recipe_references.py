@@ -1,0 +1,124 @@
+"""The motions that a recipe trains on, made once."""
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from hashlib import sha256
+from pathlib import Path
+
+from loco_drake.common.errors import InputError
+from loco_drake.common.files import read_json, write_json
+from loco_drake.control.steered_motion import steered_motion
+from loco_drake.generation.generate import generate_motions
+from loco_drake.generation.motion_model import pretrained_motion_model
+from loco_drake.models.robots import Robot
+from loco_drake.models.shipped import pretrained_path
+from loco_drake.motion.motion_file import save_motion
+from loco_drake.tracking.recipe import ReferenceSet
+from loco_drake.tracking.references import read_motions
+
+# Says what a folder holds, and whether all of it is there.
+MARK = "references.json"
+_BATCH = 32  # motions side by side; batching changes their last bits
+
+
+def make_references(
+    robot: Robot,
+    references: ReferenceSet,
+    folder: Path,
+    report: Callable[[int, int], None] = lambda done, total: None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> bool:
+    """Writes the motions of a set to ``folder``, if they are not there yet.
+
+    Killed anywhere, it goes on from the last batch of motions that was complete.
+
+    Args:
+        robot: the robot.
+        references: what to make.
+        folder: for the Motion files and ``references.json``.
+        report: is told how many of how many are there.
+        stopped: asked before each batch.
+
+    Returns:
+        Whether all motions are there now.
+
+    Raises:
+        InputError: if the folder holds other references, or was begun with other
+            weights.
+    """
+    asked = json.loads(json.dumps(asdict(references), default=str))
+    mark, found = folder / MARK, {}
+    if mark.is_file():
+        found = read_json(mark)
+        if found.get("set") != asked:
+            raise InputError(
+                f"{str(folder)!r} holds other references than the recipe asks for; "
+                "begin in another folder with --out."
+            )
+        if found.get("complete") is True:
+            return True
+    made = {"set": asked, "made_by": _weights() if references.folder is None else {}}
+    if found and found.get("made_by") != made["made_by"]:
+        raise InputError(
+            f"{str(folder)!r} was begun with other weights of tokenizer and generator; "
+            "begin in another folder with --out."
+        )
+    write_json(mark, {**made, "complete": False})
+    for unfinished in folder.glob(".*.npz"):
+        unfinished.unlink()  # left by a process that was killed
+    make = _generate if references.folder is None else _copy
+    complete = make(robot, references, folder, report, stopped)
+    if complete:
+        write_json(mark, {**made, "complete": True})
+    return complete
+
+
+def _generate(
+    robot: Robot,
+    references: ReferenceSet,
+    folder: Path,
+    report: Callable[[int, int], None],
+    stopped: Callable[[], bool],
+) -> bool:
+    model, first = pretrained_motion_model(robot.name), references.first_seed
+    last = first + references.count
+    total, done = len(references.gaits) * references.count, 0
+    for label in references.gaits:
+        for start in range(first, last, _BATCH):
+            if stopped():
+                return False
+            seeds = range(start, min(start + _BATCH, last))
+            paths = [folder / f"{label}-{seed}.npz" for seed in seeds]
+            if not all(path.is_file() for path in paths):
+                motions = generate_motions(model, label, references.seconds, seeds)
+                for seed, path, motion in zip(seeds, paths, motions, strict=True):
+                    if references.steered:
+                        motion = steered_motion(robot, motion, seed)
+                    save_motion(motion, path)
+            done += len(seeds)
+            report(done, total)
+    return True
+
+
+def _copy(
+    robot: Robot,
+    references: ReferenceSet,
+    folder: Path,
+    report: Callable[[int, int], None],
+    stopped: Callable[[], bool],
+) -> bool:
+    assert references.folder is not None
+    motions = read_motions(robot, references.folder)
+    for done, (path, motion) in enumerate(motions.items()):
+        if stopped():
+            return False
+        save_motion(motion, folder / path.name)
+        report(done + 1, len(motions))
+    return True
+
+
+def _weights() -> dict[str, str]:
+    """Returns the hashes of the files that generate motion."""
+    names = ("tokenizer", "generator")
+    return {x: sha256(pretrained_path(x).read_bytes()).hexdigest() for x in names}

@@ -1,0 +1,248 @@
+"""Trainings by a recipe, from its motions to the weights; resumable at any time."""
+
+import shutil
+import signal
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+from loco_drake.common.determinism import single_thread
+from loco_drake.common.errors import InputError, quoted
+from loco_drake.common.files import atomic_path, read_json, write_json
+from loco_drake.common.run_folder import CHECKPOINT, locked, stop_requests
+from loco_drake.control.actor import halve_policy
+from loco_drake.control.plan import Plan
+from loco_drake.models.robots import get_robot
+from loco_drake.models.shipped import training_path
+from loco_drake.tracking.beginning import read_beginning
+from loco_drake.tracking.learning_curve import PROGRESS, learning_curve
+from loco_drake.tracking.recipe import Recipe, Stage, read_recipe, write_recipe
+from loco_drake.tracking.recipe_references import make_references
+from loco_drake.tracking.references import load_references
+from loco_drake.tracking.train import POLICY, train_tracker
+
+RECIPE, CURVE, REFERENCES = "recipe.yaml", "curve.json", "references"
+# What a stage ended with; written when nothing is left to do in its folder.
+FIGURES = "figures.json"
+_START = "start.safetensors"
+
+# Is told what is being done, how much of it is done and of how much, and a note.
+Report = Callable[[str, int, int, str], None]
+
+
+def run_recipe(
+    folder: Path,
+    recipe: Recipe | None = None,
+    *,
+    resume: bool = False,
+    workers: int = 1,
+    report: Report = lambda what, done, total, note: None,
+) -> dict[str, Any]:
+    """Trains a policy by a recipe; see docs/tracking.md for what is in ``folder``.
+
+    An interruption (Ctrl-C), or being killed, loses at most the current batch.
+
+    Args:
+        folder: for motions, stages and policy.
+        recipe: what to do; with ``resume``, None for that of the folder.
+        resume: go on in ``folder``. Stages that have not begun may be others then.
+        workers: simulation processes; results do not depend on them.
+        report: called after each batch.
+
+    Returns:
+        robot, interrupted, steps of all stages so far, and their learning curve.
+
+    Raises:
+        InputError: if the folder holds a run and ``resume`` is not set, or the other
+            way round; if another process works in it; or if the recipe is another.
+        ChildProcessError: if a worker process is killed.
+    """
+    folder = Path(folder)
+    check_recipe_folder(folder, resume=resume)
+    if recipe is None:
+        recipe = read_recipe(folder / RECIPE)
+    recipe.check()
+    recipe.training(0, workers)
+    with locked(folder), single_thread(), stop_requests() as stop:
+        check_recipe_folder(folder, resume=resume)
+        run = _Run(folder, recipe, workers, report, stop)
+        if resume:
+            run.check_continues(read_recipe(folder / RECIPE))
+        run.begin()
+        interrupted = not (run.make_references() and run.train())
+        if not interrupted:
+            last = run.stage_folder(len(recipe.stages) - 1)
+            halve_policy(last / POLICY, folder / POLICY)
+        curve = recipe_curve(folder, recipe)
+        write_json(folder / CURVE, curve)
+    return {"robot": recipe.robot, "interrupted": interrupted, **curve}
+
+
+def check_recipe_folder(folder: Path, *, resume: bool) -> None:
+    """Raises InputError if a recipe cannot begin, or go on, in ``folder``."""
+    found = [x for x in (RECIPE, POLICY, CHECKPOINT) if (folder / x).exists()]
+    if resume and RECIPE not in found:
+        raise InputError(
+            f"There is no recipe to resume in {str(folder)!r}, which has no {RECIPE}; "
+            "to begin one, leave out --resume."
+        )
+    if found and not resume:
+        raise InputError(
+            f"{str(folder)!r} holds a run already ({', '.join(found)}); resume it "
+            "with --resume, or name another folder with --out."
+        )
+
+
+def stage_folder(folder: Path, recipe: Recipe, index: int) -> Path:
+    """Returns the folder of a stage, such as ``2-steered``; the index begins at 0."""
+    return folder / f"{index + 1}-{recipe.stages[index].name}"
+
+
+def recipe_curve(folder: Path, recipe: Recipe) -> dict[str, Any]:
+    """Returns the learning curve of all stages, one after the other.
+
+    Returns:
+        "steps" and "seconds" of all stages so far, "stages" with the name of each that
+        has begun and the steps at which it did, and "curve" with "steps", "seconds" and
+        "return": the mean over its labels of the normalized return (0-100) of recent
+        training episodes, see :func:`.learning_curve`.
+    """
+    stages: list[dict[str, Any]] = []
+    curve: dict[str, list[Any]] = {"steps": [], "seconds": [], "return": []}
+    steps, seconds = 0, 0.0
+    for index, stage in enumerate(recipe.stages):
+        own = stage_folder(folder, recipe, index)
+        if not own.is_dir():
+            break
+        stages.append({"name": stage.name, "first_step": steps})
+        log = (
+            learning_curve(own / PROGRESS)
+            if (own / PROGRESS).is_file()
+            else {"steps": [], "seconds": [], "return": {}}
+        )
+        curve["steps"] += [steps + x for x in log["steps"]]
+        curve["seconds"] += [round(seconds + x, 1) for x in log["seconds"]]
+        for scores in zip(*log["return"].values(), strict=True):
+            known = [score for score in scores if score is not None]
+            curve["return"].append(round(sum(known) / len(known), 2))
+        ended = own / FIGURES
+        done = read_json(ended) if ended.is_file() else {}
+        steps += int(done.get("steps", max(log["steps"], default=0)))
+        seconds = max(curve["seconds"], default=0.0)
+    return {"steps": steps, "seconds": seconds, "stages": stages, "curve": curve}
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A recipe in its locked folder."""
+
+    folder: Path
+    recipe: Recipe
+    workers: int
+    report: Report
+    stop: Event
+
+    def stage_folder(self, index: int) -> Path:
+        return stage_folder(self.folder, self.recipe, index)
+
+    def check_continues(self, before: Recipe) -> None:
+        """Raises InputError unless what has begun would be the same by ``before``."""
+        old, new = asdict(before), asdict(self.recipe)
+        differ = [
+            name
+            for name in ("robot", "seed", "environments", "start_from")
+            if old[name] != new[name]
+        ]
+        kept = {x: new["references"].get(x) for x in old["references"]}
+        if kept != old["references"]:
+            differ.append("references")
+        # What differs for the whole recipe does so for each stage.
+        for index, stage in enumerate([] if differ else before.stages):
+            if not stage_folder(self.folder, before, index).exists():
+                break
+            if index >= len(self.recipe.stages) or _of_stage(before, index) != (
+                _of_stage(self.recipe, index)
+            ):
+                differ.append(f"the stage {quoted(stage.name)}, which has begun")
+        if differ:
+            raise InputError(
+                f"The run in {str(self.folder)!r} follows a recipe with other "
+                f"{', '.join(differ)}; resume it as it is, or begin in another folder "
+                "with --out."
+            )
+
+    def begin(self) -> None:
+        """Writes the recipe, and what the first stage starts from."""
+        start = self.folder / _START
+        if self.recipe.start_from is not None and not start.is_file():
+            path = training_path(self.recipe.start_from)
+            read_beginning(path, self.recipe.training(0).ppo.hidden)
+            with atomic_path(start) as temporary:
+                shutil.copyfile(path, temporary)
+        path = self.folder / RECIPE
+        if not path.is_file() or read_recipe(path) != self.recipe:
+            write_recipe(self.recipe, path)
+
+    def make_references(self) -> bool:
+        """Makes all motions; returns False if it was stopped."""
+        robot = get_robot(self.recipe.robot)
+        for name, references in self.recipe.references.items():
+
+            def report(done: int, total: int, name: str = name) -> None:
+                self.report(f"motions {name}", done, total, "")
+
+            folder = self.folder / REFERENCES / name
+            if not make_references(robot, references, folder, report, self.stop.is_set):
+                return False
+        return True
+
+    def train(self) -> bool:
+        """Does all stages that are not done; returns False if it was stopped."""
+        plans: dict[str, list[Plan]] = {}
+        for index, stage in enumerate(self.recipe.stages):
+            if (self.stage_folder(index) / FIGURES).is_file():
+                continue
+            for name in self.recipe.references_of(stage):
+                if self.stop.is_set():
+                    return False
+                if name not in plans:
+                    robot = get_robot(self.recipe.robot)
+                    folder = self.folder / REFERENCES / name
+                    plans[name] = load_references(robot, folder)
+            own = [x for n in self.recipe.references_of(stage) for x in plans[n]]
+            if not self._train_stage(index, stage, own):
+                return False
+        return True
+
+    def _train_stage(self, index: int, stage: Stage, plans: list[Plan]) -> bool:
+        folder, first = self.stage_folder(index), None
+        resume = (folder / CHECKPOINT).is_file()
+        if not resume and index > 0:
+            # Not its policy, which a kill may have left a batch behind.
+            first = self.stage_folder(index - 1) / CHECKPOINT
+        elif not resume and self.recipe.start_from is not None:
+            first = self.folder / _START
+
+        def report(steps: int, scores: dict[str, float]) -> None:
+            mean = sum(scores.values()) / len(scores)
+            note = f"return {mean:.1f} of 100"
+            self.report(f"{index + 1} {stage.name}", steps, stage.steps, note)
+            if self.stop.is_set():  # before the training listened itself
+                signal.raise_signal(signal.SIGINT)
+
+        config = self.recipe.training(index, self.workers)
+        figures = train_tracker(
+            plans, config, folder, resume=resume, first=first, report=report
+        )
+        if figures["interrupted"]:
+            return False
+        write_json(folder / FIGURES, figures)
+        return True
+
+
+def _of_stage(recipe: Recipe, index: int) -> tuple[Any, ...]:
+    """Returns what a stage depends on, for comparison."""
+    stage = recipe.stages[index]
+    return stage.name, recipe.references_of(stage), recipe.training(index)

@@ -1,0 +1,316 @@
+"""Trainings by a recipe: interrupted anywhere, they end as if they had not been."""
+
+import json
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+from loco_drake.common.errors import InputError
+from loco_drake.common.run_folder import locked, read_checkpoint
+from loco_drake.control.actor import load_actor
+from loco_drake.models.robots import get_robot
+from loco_drake.motion.motion_file import load_motion
+from loco_drake.tracking.recipe import Recipe, ReferenceSet, Stage, read_recipe
+from loco_drake.tracking.recipe_references import make_references
+from loco_drake.tracking.recipe_run import run_recipe
+from tests.process import LIMIT
+
+pytestmark = pytest.mark.slow
+
+CHECKPOINT, POLICY = "checkpoint.safetensors", "policy.safetensors"
+# Kills the process when the function of the module is called for the n-th time, before
+# or after its work.
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from loco_drake.tracking import recipe_references, recipe_run
+from loco_drake.tracking.recipe import read_recipe
+
+recipe, folder, module, name, count, after = sys.argv[1:]
+module = {"run": recipe_run, "references": recipe_references}[module]
+works, calls = getattr(module, name), 0
+
+def killed(*arguments, **options):
+    global calls
+    calls += 1
+    if calls == int(count) and after == "before":
+        os.kill(os.getpid(), signal.SIGKILL)
+    result = works(*arguments, **options)
+    if calls == int(count):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return result
+
+if __name__ == "__main__":
+    setattr(module, name, killed)
+    recipe_run.run_recipe(Path(folder), read_recipe(Path(recipe)))
+"""
+
+
+def make_recipe():
+    return Recipe(
+        environments=4,
+        references={
+            "plain": ReferenceSet(labels=["dog-trot"], count=2, seconds=3.0),
+            "steered": ReferenceSet(
+                labels=["dog-pace", "dog-trot"], count=1, seconds=3.0, steered=True
+            ),
+        },
+        stages=[
+            Stage(name="first", steps=192, references=["plain"]),
+            Stage(name="second", steps=128, environment={"fall_cost": 15.0}),
+        ],
+    )
+
+
+@pytest.fixture(scope="module")
+def recipe():
+    recipe = make_recipe()
+    recipe.common.environment = {"episode_steps": 20}
+    recipe.common.ppo = {"batch": 64, "minibatch": 32, "epochs": 2, "hidden": [16, 16]}
+    return recipe
+
+
+@pytest.fixture(scope="module")
+def ended(recipe, tmp_path_factory):
+    """A recipe that was never interrupted."""
+    folder = tmp_path_factory.mktemp("recipe") / "run"
+    return folder, run_recipe(folder, recipe)
+
+
+def contents(folder):
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in files}
+
+
+def check_same_results(folder, other):
+    """Policies and checkpoints are those of ``other``, bit for bit."""
+    assert (folder / POLICY).read_bytes() == (other / POLICY).read_bytes()
+    for stage in ("1-first", "2-second"):
+        own, theirs = (
+            read_checkpoint(run / stage / CHECKPOINT, "tracker")
+            for run in (folder, other)
+        )
+        assert own.state == theirs.state
+        assert own.run == theirs.run
+        assert own.tensors.keys() == theirs.tensors.keys()
+        for name, value in own.tensors.items():
+            assert torch.equal(value.nan_to_num(), theirs.tensors[name].nan_to_num())
+
+
+def test_a_recipe_leaves_motions_stages_and_the_policy(ended, recipe):
+    folder, figures = ended
+    assert not figures["interrupted"]
+    assert figures["steps"] == 320
+    assert read_recipe(folder / "recipe.yaml") == recipe
+    references = {path.relative_to(folder) for path in folder.rglob("*.npz")}
+    names = ("plain/dog-trot-1000", "plain/dog-trot-1001")
+    names += ("steered/dog-pace-1000", "steered/dog-trot-1000")
+    assert references == {Path(f"references/{name}.npz") for name in names}
+    steered = [load_motion(folder / x).provenance.get("steered") for x in references]
+    assert sum(x is not None for x in steered) == 2
+    policy = load_actor(folder / POLICY, get_robot("go2"))
+    exact = load_actor(folder / "2-second" / POLICY, get_robot("go2"))
+    for name, value in policy.state_dict().items():
+        torch.testing.assert_close(
+            value, exact.state_dict()[name], rtol=1e-3, atol=1e-4
+        )
+    second = read_checkpoint(folder / "2-second" / CHECKPOINT, "tracker").run
+    assert second["references"].startswith("4 motions")
+    assert (second["fall_cost"], second["seed"]) == (15.0, 1)
+
+
+def test_a_stage_begins_with_the_networks_of_the_one_before(ended):
+    """They have moved little since; a new one's are elsewhere."""
+    first, second = (
+        read_checkpoint(ended[0] / stage / CHECKPOINT, "tracker")
+        for stage in ("1-first", "2-second")
+    )
+    assert second.state["steps"] == 128
+    assert second.state["normalizer_count"] > first.state["normalizer_count"] + 127
+    name = "module/mlp_extractor.policy_net.0.weight"
+    moved = (second.tensors[name] - first.tensors[name]).abs().max()
+    assert 0 < moved < 0.02 < first.tensors[name].abs().max()
+
+
+def test_the_curve_counts_the_steps_of_all_stages(ended):
+    folder, figures = ended
+    written = json.loads((folder / "curve.json").read_text())
+    assert written == {k: figures[k] for k in written}
+    starts = [(stage["name"], stage["first_step"]) for stage in written["stages"]]
+    assert starts == [("first", 0), ("second", 192)]
+    # A run that ends writes no line for its last batch.
+    assert written["curve"]["steps"] == [64, 128, 192 + 64]
+    assert written["curve"]["seconds"] == sorted(written["curve"]["seconds"])
+    log = (folder / "2-second" / "progress.jsonl").read_text().splitlines()
+    last = json.loads(log[-1])
+    own = [last[f"return/{label}"] for label in ("dog-pace", "dog-trot")]
+    assert written["curve"]["return"][-1] == pytest.approx(sum(own) / 2, abs=0.01)
+
+
+def test_results_do_not_depend_on_the_number_of_processes(ended, recipe, tmp_path):
+    run_recipe(tmp_path / "run", recipe, workers=2)
+    check_same_results(tmp_path / "run", ended[0])
+
+
+@pytest.mark.parametrize(
+    "point",
+    [
+        "references save_motion 2 after",  # within a batch of motions
+        "references write_json 2 before",  # all motions, not yet marked as such
+        "run train_tracker 1 before",
+        "run train_tracker 1 after",  # trained, not yet marked as such
+        "run train_tracker 2 before",
+        "run halve_policy 1 before",
+        "run write_json 3 before",  # all but the curve
+    ],
+)
+def test_a_killed_recipe_goes_on_to_the_same_policy(point, ended, recipe, tmp_path):
+    folder = tmp_path / "run"
+    arguments = [ended[0] / "recipe.yaml", folder, *point.split()]
+    process = subprocess.run(
+        [sys.executable, "-c", KILLED, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+        check=False,
+    )
+    assert process.returncode == -signal.SIGKILL, process.stderr
+    with pytest.raises(InputError, match="holds a run already"):
+        run_recipe(folder, recipe)
+    before = contents(folder)
+    figures = run_recipe(folder, resume=True)
+    assert not figures["interrupted"]
+    assert figures["steps"] == 320
+    check_same_results(folder, ended[0])
+    after = contents(folder)
+    for path, (content, time) in before.items():
+        if path.suffix == ".npz":
+            assert after[path] == (content, time)
+        elif path.suffix == ".jsonl":
+            assert after[path][0].startswith(content)
+
+
+def test_an_interrupted_stage_goes_on_with_its_next_batch(recipe, ended, tmp_path):
+    def interrupt(what, done, total, note):
+        if (what, done) == ("2 second", 64):
+            signal.raise_signal(signal.SIGINT)
+
+    figures = run_recipe(tmp_path, recipe, report=interrupt)
+    assert figures["interrupted"]
+    assert figures["steps"] == 192 + 64
+    assert not (tmp_path / POLICY).exists()
+    assert not run_recipe(tmp_path, resume=True)["interrupted"]
+    state = read_checkpoint(tmp_path / "2-second" / CHECKPOINT, "tracker").state
+    assert state["steps"] == 128
+    assert load_actor(tmp_path / POLICY, get_robot("go2"))
+
+
+def test_an_interruption_between_stages_is_heard(recipe, tmp_path):
+    """While motions are made, and it does not begin to train then."""
+    figures = run_recipe(
+        tmp_path, recipe, report=lambda *told: signal.raise_signal(signal.SIGINT)
+    )
+    assert figures["interrupted"]
+    assert figures["steps"] == 0
+    assert len(list(tmp_path.rglob("*.npz"))) == 2
+    assert not (tmp_path / "1-first").exists()
+
+
+def test_nothing_is_done_again_and_nothing_overwritten(recipe, ended):
+    folder = ended[0]
+    before = contents(folder)
+    with pytest.raises(InputError, match=r"holds a run already.*--resume.*--out"):
+        run_recipe(folder, recipe)
+    with (
+        locked(folder),
+        pytest.raises(InputError, match="Another training is at work"),
+    ):
+        run_recipe(folder, resume=True)
+    with pytest.raises(InputError, match=r"no recipe to resume.*recipe.yaml"):
+        run_recipe(folder / "1-first", resume=True)
+    assert contents(folder) == before
+    run_recipe(folder, recipe, resume=True)
+    changed = {path for path, x in contents(folder).items() if x != before.get(path)}
+    assert changed <= {folder / "curve.json", folder / POLICY}
+    assert all(path.read_bytes() == before[path][0] for path in before)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"seed": 3}, "other seed;"),
+        ({"robot": "a1", "environments": 8}, "other robot, environments;"),
+        ({"start_from": Path("go2")}, "other start_from;"),
+        ({"references": {}}, "other references"),
+        ({"stages": []}, "'first', which has begun, the stage 'second', which has"),
+    ],
+)
+def test_a_recipe_cannot_change_what_has_begun(change, said, recipe, ended):
+    other = replace(recipe, **change)
+    if "references" in change:
+        sets = dict(recipe.references)
+        other.references = {**sets, "plain": replace(sets["plain"], count=3)}
+    if "stages" in change:
+        other.stages = [replace(stage, steps=64) for stage in recipe.stages]
+    before = contents(ended[0])
+    with pytest.raises(InputError, match=said):
+        run_recipe(ended[0], other, resume=True)
+    assert contents(ended[0]) == before
+
+
+def test_stages_that_have_not_begun_may_change(recipe, ended, tmp_path):
+    """The result is that of the recipe as it is in the end."""
+    one = replace(recipe, stages=recipe.stages[:1])
+    one.references = {"plain": recipe.references["plain"]}
+    assert not run_recipe(tmp_path, one)["interrupted"]
+    assert run_recipe(tmp_path, recipe, resume=True)["steps"] == 320
+    check_same_results(tmp_path, ended[0])
+    assert read_recipe(tmp_path / "recipe.yaml") == recipe
+
+
+def test_a_recipe_can_start_from_a_policy_which_it_keeps(recipe, ended, tmp_path):
+    """The A1's from the Go2's; the file may change or vanish afterwards."""
+    file = tmp_path / "go2.safetensors"
+    file.write_bytes((ended[0] / POLICY).read_bytes())
+    one = replace(recipe, robot="a1", start_from=file, stages=recipe.stages[:1])
+    one.references = {"plain": recipe.references["plain"]}
+    run = tmp_path / "run"
+    run_recipe(run, one, report=lambda *told: signal.raise_signal(signal.SIGINT))
+    kept = (run / "start.safetensors").read_bytes()
+    assert kept == file.read_bytes()
+    file.unlink()
+    assert run_recipe(run, resume=True)["steps"] == 192
+    count = read_checkpoint(run / "1-first" / CHECKPOINT, "tracker").state
+    policy = read_checkpoint(ended[0] / "2-second" / CHECKPOINT, "tracker").state
+    assert count["normalizer_count"] > policy["normalizer_count"] + 191
+
+
+def test_ones_own_motions_are_copied(ended, tmp_path):
+    own = ReferenceSet(folder=ended[0] / "references" / "plain")
+    assert make_references(get_robot("go2"), own, tmp_path)
+    names = [f"dog-trot-{seed}.npz" for seed in (1000, 1001)]
+    assert sorted(path.name for path in tmp_path.glob("*.npz")) == names
+    for name in names:
+        assert (tmp_path / name).read_bytes() == (own.folder / name).read_bytes()
+    with pytest.raises(InputError, match="holds other references"):
+        make_references(get_robot("go2"), ReferenceSet(), tmp_path)
+
+
+def test_motions_of_other_weights_are_not_mixed(tmp_path):
+    one = ReferenceSet(labels=["dog-trot", "dog-pace"], count=1, seconds=2.0)
+    asked = iter([False, True])
+    assert not make_references(
+        get_robot("go2"), one, tmp_path, stopped=lambda: next(asked)
+    )
+    mark = tmp_path / "references.json"
+    text = json.loads(mark.read_text())
+    assert text["complete"] is False
+    text["made_by"]["generator"] = "another"
+    mark.write_text(json.dumps(text))
+    with pytest.raises(InputError, match="begun with other weights"):
+        make_references(get_robot("go2"), one, tmp_path)
