@@ -29,8 +29,10 @@ class TrainRecipe:
     workers: int = 2
     # Try a recipe with this share of its steps and motions.
     scale: float = 1.0
-    # Seed of all trainings. Default: the recipe's.
-    seed: int | None = None
+    # Seed of all trainings.
+    seed: Annotated[int | None, option(metavar="INT", default="that of the recipe")] = (
+        None
+    )
     json: Json = None
 
     def run(self) -> int:
@@ -65,11 +67,16 @@ class TrainRecipe:
                 report=report,
             )
         write_json(self.json, figures)
-        returns = figures["curve"]["return"]
+        returns, points = figures["curve"]["return"], figures["evaluation"]
         rows = [
             ("steps", f"{figures['steps']}"),
             ("hours", f"{figures['seconds'] / 3600:.2f}"),
             ("training return", f"{returns[-1]:.1f}" if returns else "-"),
+            (
+                "return without noise",
+                (points and f"{points[-1]['mean_return']:.1f}") or "-",
+            ),
+            ("steps to a return of 90", f"{figures['steps_to_90'] or '-'}"),
         ]
         print_table(str(self.out), ("figure", "value"), rows)
         if figures["interrupted"]:

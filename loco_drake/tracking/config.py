@@ -76,6 +76,9 @@ class EnvironmentConfig:
     # Training cost of a fall in perfect steps, beyond the steps that it loses. Reported
     # returns do not include it.
     fall_cost: float = 0.0
+    # Share of the episodes that start where episodes have failed, in proportion to
+    # failure rates by the second of a plan; the others start anywhere.
+    failure_weight: float = 0.0
     # Domain randomization; a range is two numbers.
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
 
@@ -90,6 +93,7 @@ class EnvironmentConfig:
             check_bounds(f"--reset-noise.{name}", value, 0)
         check_bounds("--position-penalty", self.position_penalty, 0)
         check_bounds("--fall-cost", self.fall_cost, 0)
+        check_bounds("--failure-weight", self.failure_weight, 0, 1)
         self.randomization.check(robot, self.plant)
 
     def known_to(self, *, privileged: bool) -> "EnvironmentConfig":
@@ -131,8 +135,14 @@ class PpoConfig:
     target_kl: float = 0.02
     # Learning rate of the critic.
     critic_rate: float = 1e-3
-    # Initial log standard deviation of the actions.
+    # Initial log standard deviation of the actions of new networks.
     log_std: float = -0.7
+    # That of networks to start from. Default: theirs.
+    restart_log_std: float | None = None
+    # Whether the standard deviation is learned, rather than held.
+    learn_std: bool = True
+    # Weight of the entropy of the actions in the loss.
+    entropy: float = 0.0
     # Widths of the hidden layers, of actor and critic each.
     hidden: list[int] = field(default_factory=lambda: [256, 128])
     # Whether the policy observes position and velocity of the base, which a real robot
@@ -154,8 +164,12 @@ class PpoConfig:
             option = f"--{name.replace('_', '-')}"
             check_bounds(option, getattr(self, name), 0, 1, above=True)
         check_bounds("--target-kl", self.target_kl, 0, above=True)
-        if not np.isfinite(self.log_std):
-            raise InputError(f"--log-std must be a number, not {self.log_std}.")
+        check_bounds("--entropy", self.entropy, 0)
+        for name in ("log_std", "restart_log_std"):
+            value = getattr(self, name)
+            if value is not None and not np.isfinite(value):
+                option = f"--{name.replace('_', '-')}"
+                raise InputError(f"{option} must be a number, not {value}.")
 
 
 @dataclass(kw_only=True)

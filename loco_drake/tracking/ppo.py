@@ -140,7 +140,7 @@ def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
         gamma=config.gamma,
         gae_lambda=config.gae_lambda,
         clip_range=config.clip,
-        ent_coef=0.0,
+        ent_coef=config.entropy,
         max_grad_norm=1.0,
         policy_kwargs={
             "net_arch": {"pi": config.hidden, "vf": config.hidden},
@@ -154,6 +154,7 @@ def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
     learner.target = config.target_kl
     learner.rate = config.actor_rate
     learner.split_optimizer(config.critic_rate)
+    learner.policy.log_std.requires_grad_(config.learn_std)
     return learner
 
 

@@ -24,6 +24,7 @@ from loco_drake.motion.gaits import LABELS, GaitLabel, parse_label
 from loco_drake.tracking.config import TrainingConfig
 
 ALL = "all"
+EVALUATION = "evaluation"  # name of the motions to evaluate on
 _SHIPPED = Path(__file__).parent / "recipes"
 
 
@@ -78,6 +79,23 @@ class Stage:
 
 
 @dataclass(kw_only=True)
+class Evaluation:
+    """Evaluation on the way, without noise, on motions that are not trained on."""
+
+    # Steps between evaluations. One follows each stage, too.
+    every: int = 1_000_000
+    # What to evaluate on; episodes are as long as the motions.
+    motions: ReferenceSet = field(
+        default_factory=lambda: ReferenceSet(count=2, first_seed=0)
+    )
+
+    def check(self) -> None:
+        """Raises InputError unless it can be done."""
+        check_bounds("The recipe's evaluation: every", self.every, 1)
+        self.motions.check(EVALUATION)
+
+
+@dataclass(kw_only=True)
 class Common:
     """Options of `train tracker` in all stages, where they differ from its defaults."""
 
@@ -102,6 +120,8 @@ class Recipe:
     references: dict[str, ReferenceSet] = field(default_factory=dict)
     common: Common = field(default_factory=Common)
     stages: list[Stage] = field(default_factory=list)
+    # Null for none.
+    evaluation: Evaluation | None = field(default_factory=Evaluation)
 
     def check(self) -> None:
         """Raises InputError unless everything can begin."""
@@ -110,6 +130,10 @@ class Recipe:
         check_bounds("The recipe's environments", self.environments, 1)
         if not (self.stages and self.references):
             raise InputError("A recipe needs references and stages.")
+        if EVALUATION in self.references:
+            raise InputError(f"No references can be called {EVALUATION!r}.")
+        if self.evaluation is not None:
+            self.evaluation.check()
         for name, references in self.references.items():
             _check_folder_name("name of references", name)
             references.check(name)
@@ -186,7 +210,10 @@ def read_recipe(name: Path) -> Recipe:
 def write_recipe(recipe: Recipe, path: Path) -> None:
     """Writes a recipe with all its fields, for :func:`read_recipe`."""
     values = asdict(recipe)
-    for part in (values, *values["references"].values()):
+    parts = [values, *values["references"].values()]
+    if recipe.evaluation is not None:
+        parts.append(values["evaluation"]["motions"])
+    for part in parts:
         part.update((k, str(v)) for k, v in part.items() if isinstance(v, Path))
     with atomic_path(path) as temporary:
         temporary.write_text(yaml.safe_dump(values, sort_keys=False))
@@ -200,6 +227,8 @@ def scaled(recipe: Recipe, scale: float) -> Recipe:
         stage.steps = max(1, round(scale * stage.steps))
     for references in copy.references.values():
         references.count = max(1, round(scale * references.count))
+    if copy.evaluation is not None:
+        copy.evaluation.every = max(1, round(scale * copy.evaluation.every))
     return copy
 
 

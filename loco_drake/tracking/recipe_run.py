@@ -18,7 +18,14 @@ from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import training_path
 from loco_drake.tracking.beginning import read_beginning
 from loco_drake.tracking.learning_curve import PROGRESS, learning_curve
-from loco_drake.tracking.recipe import Recipe, Stage, read_recipe, write_recipe
+from loco_drake.tracking.recipe import (
+    EVALUATION,
+    Recipe,
+    Stage,
+    read_recipe,
+    write_recipe,
+)
+from loco_drake.tracking.recipe_evaluation import Evaluator, read_points, steps_to_goal
 from loco_drake.tracking.recipe_references import make_references
 from loco_drake.tracking.references import load_references
 from loco_drake.tracking.train import POLICY, train_tracker
@@ -27,6 +34,7 @@ RECIPE, CURVE, REFERENCES = "recipe.yaml", "curve.json", "references"
 # What a stage ended with; written when nothing is left to do in its folder.
 FIGURES = "figures.json"
 _START = "start.safetensors"
+_POINTS = "evaluation.json"
 
 # Is told what is being done, how much of it is done and of how much, and a note.
 Report = Callable[[str, int, int, str], None]
@@ -67,7 +75,11 @@ def run_recipe(
     recipe.training(0, workers)
     with locked(folder), single_thread(), stop_requests() as stop:
         check_recipe_folder(folder, resume=resume)
-        run = _Run(folder, recipe, workers, report, stop)
+        evaluator = None
+        if recipe.evaluation is not None:
+            motions = folder / REFERENCES / EVALUATION
+            evaluator = Evaluator(recipe, motions, folder / _POINTS)
+        run = _Run(folder, recipe, workers, report, stop, evaluator)
         if resume:
             run.check_continues(read_recipe(folder / RECIPE))
         run.begin()
@@ -107,7 +119,9 @@ def recipe_curve(folder: Path, recipe: Recipe) -> dict[str, Any]:
         "steps" and "seconds" of all stages so far, "stages" with the name of each that
         has begun and the steps at which it did, and "curve" with "steps", "seconds" and
         "return": the mean over its labels of the normalized return (0-100) of recent
-        training episodes, see :func:`.learning_curve`.
+        training episodes, see :func:`.learning_curve`. "evaluation" has the points of
+        :class:`.Evaluator`, and "steps_to_90" the steps of its first return of 90, or
+        None.
     """
     stages: list[dict[str, Any]] = []
     curve: dict[str, list[Any]] = {"steps": [], "seconds": [], "return": []}
@@ -131,7 +145,15 @@ def recipe_curve(folder: Path, recipe: Recipe) -> dict[str, Any]:
         done = read_json(ended) if ended.is_file() else {}
         steps += int(done.get("steps", max(log["steps"], default=0)))
         seconds = max(curve["seconds"], default=0.0)
-    return {"steps": steps, "seconds": seconds, "stages": stages, "curve": curve}
+    points = read_points(folder / _POINTS)
+    return {
+        "steps": steps,
+        "seconds": seconds,
+        "stages": stages,
+        "curve": curve,
+        "evaluation": [asdict(point) for point in points],
+        "steps_to_90": steps_to_goal(points),
+    }
 
 
 @dataclass(frozen=True)
@@ -143,6 +165,7 @@ class _Run:
     workers: int
     report: Report
     stop: Event
+    evaluator: Evaluator | None
 
     def stage_folder(self, index: int) -> Path:
         return stage_folder(self.folder, self.recipe, index)
@@ -187,8 +210,10 @@ class _Run:
 
     def make_references(self) -> bool:
         """Makes all motions; returns False if it was stopped."""
-        robot = get_robot(self.recipe.robot)
-        for name, references in self.recipe.references.items():
+        robot, sets = get_robot(self.recipe.robot), dict(self.recipe.references)
+        if self.recipe.evaluation is not None:
+            sets[EVALUATION] = self.recipe.evaluation.motions
+        for name, references in sets.items():
 
             def report(done: int, total: int, name: str = name) -> None:
                 self.report(f"motions {name}", done, total, "")
@@ -225,12 +250,16 @@ class _Run:
         elif not resume and self.recipe.start_from is not None:
             first = self.folder / _START
 
+        before = sum(self._ended_with(i)["steps"] for i in range(index))
+
         def report(steps: int, scores: dict[str, float]) -> None:
             mean = sum(scores.values()) / len(scores)
             note = f"return {mean:.1f} of 100"
             self.report(f"{index + 1} {stage.name}", steps, stage.steps, note)
             if self.stop.is_set():  # before the training listened itself
                 signal.raise_signal(signal.SIGINT)
+            if self.evaluator and self.evaluator.is_due(before + steps):
+                self.evaluator.evaluate(before + steps, index, folder / POLICY)
 
         config = self.recipe.training(index, self.workers)
         figures = train_tracker(
@@ -238,8 +267,14 @@ class _Run:
         )
         if figures["interrupted"]:
             return False
+        if self.evaluator:
+            steps = before + figures["steps"]
+            self.evaluator.evaluate(steps, index, folder / POLICY)
         write_json(folder / FIGURES, figures)
         return True
+
+    def _ended_with(self, index: int) -> dict[str, Any]:
+        return read_json(self.stage_folder(index) / FIGURES)
 
 
 def _of_stage(recipe: Recipe, index: int) -> tuple[Any, ...]:

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from loco_drake.control.plan import Plan
 from loco_drake.motion.gaits import ROW_LABELS
+from loco_drake.tracking.failure_starts import FailureStarts
 
 _MEMORY = 0.98  # weight of the past in a label's score, per episode
 _PLAN_MEMORY = 0.6  # the same of a plan's score: it is drawn seldom
@@ -13,6 +14,10 @@ _PLAN_MEMORY = 0.6  # the same of a plan's score: it is drawn seldom
 _LEAST, _MOST = 0.1, 0.8
 _MOST_OF_PLAN = 0.5  # within a label; a plan that nobody could follow is to be no sink
 _SHORTEST = 0.05  # share of an episode that the shortest are taken to last
+
+
+# A plan's index, and the sample of it to start at, None where the environment draws it.
+Start = tuple[int, int | None]
 
 
 class PlanSampler:
@@ -25,9 +30,21 @@ class PlanSampler:
     the steps of their label by the same rule, since a label can contain very different
     motion. Plans not yet drawn have the score of their label. The label of a plan is
     that of its first sample.
+
+    With a ``failure_weight`` above 0 it also draws where episodes start, see
+    :class:`.FailureStarts`, such that ``half_episode`` samples of the plan are left.
     """
 
-    def __init__(self, plans: list[Plan], seed: int) -> None:
+    def __init__(
+        self,
+        plans: list[Plan],
+        seed: int,
+        *,
+        failure_weight: float = 0.0,
+        half_episode: int = 0,
+    ) -> None:
+        self.starts = FailureStarts(plans, failure_weight) if failure_weight else None
+        self._last_starts = [max(0, len(plan) - 1 - half_episode) for plan in plans]
         self._labels = np.array([int(plan.labels[0]) for plan in plans])
         self.present = np.unique(self._labels)
         # Mean normalized return of recent episodes, 0 to 1, by label.
@@ -48,6 +65,18 @@ class PlanSampler:
         scores = np.where(undrawn, self.scores[label], self.plan_scores[plans])
         shares = np.where(undrawn, self.shares[label], self.plan_shares[plans])
         return self._choose(plans, scores, shares, _MOST_OF_PLAN)
+
+    def draw_start(self) -> Start:
+        """Returns a plan, and where to start."""
+        plan = self.draw()
+        if self.starts is None:
+            return plan, None
+        return plan, self.starts.draw(plan, self._last_starts[plan], self.random)
+
+    def record_end(self, plan: int, start: int, end: int, *, failed: bool) -> None:
+        """Records where an episode on a plan started and ended, by its samples."""
+        if self.starts is not None:
+            self.starts.record(plan, start, end, failed)
 
     def _choose(
         self,

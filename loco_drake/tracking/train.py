@@ -38,6 +38,7 @@ POLICY = "policy.safetensors"
 
 # State of the sampler.
 _SCORES = ("scores", "shares", "plan_scores", "plan_shares")
+_FAILURES = "sampler/failure_rates"
 
 
 # Is told the environment steps so far, and the mean normalized return of recent
@@ -94,7 +95,12 @@ def train_tracker(
         "observation_layout": LAYOUT,
     }
     beginning = None if first is None else read_beginning(first, config.ppo.hidden)
-    sampler = PlanSampler(plans, config.seed)
+    sampler = PlanSampler(
+        plans,
+        config.seed,
+        failure_weight=config.environment.failure_weight,
+        half_episode=config.environment.episode_steps // 2,
+    )
     start = time.monotonic()
     with (
         single_thread(),
@@ -126,6 +132,8 @@ def train_tracker(
             learner = make_ppo(environment, config.ppo, config.seed)
             if beginning is not None:
                 beginning.load(learner)
+                if config.ppo.restart_log_std is not None:
+                    learner.policy.log_std.data.fill_(config.ppo.restart_log_std)
             if held.saved is not None:
                 _restore(learner, sampler, held.saved)
             writer = TensorBoardOutputFormat(str(folder))
@@ -168,6 +176,8 @@ def _state(
     tensors["random/numpy"] = torch.from_numpy(np.asarray(keys).astype(np.int64))
     for name in _SCORES:
         tensors[f"sampler/{name}"] = torch.from_numpy(getattr(sampler, name))
+    if sampler.starts is not None:
+        tensors[_FAILURES] = torch.from_numpy(sampler.starts.rates)
     return tensors, {
         "steps": learner.num_timesteps,
         "learning_rate": learner.rate,
@@ -188,6 +198,8 @@ def _restore(learner: AdaptivePPO, sampler: PlanSampler, saved: Checkpoint) -> N
             # Checkpoints of before know fewer labels, and may be of other plans.
             if not name.startswith("plan") or len(own) == len(scores):
                 own[: len(scores)] = scores
+        if sampler.starts is not None:
+            sampler.starts.rates[:] = saved.tensors[_FAILURES].numpy()
         sampler.random.bit_generator.state = saved.state["sampler_random"]
         position, has_gauss, gauss = saved.state["numpy_random"]
         keys = saved.tensors["random/numpy"].numpy().astype(np.uint32)

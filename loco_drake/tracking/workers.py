@@ -17,7 +17,7 @@ from loco_drake.control.plan import Plan
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
-from loco_drake.tracking.sampler import PlanSampler
+from loco_drake.tracking.sampler import PlanSampler, Start
 
 # Share of the terminated episodes that are retried from a number of samples before the
 # failure, so that difficult moments are practised most.
@@ -33,7 +33,7 @@ def _work(
     config: EnvironmentConfig,
     seeds: list[int],
 ) -> None:
-    """Serves messages with actions and the plans of the next episodes."""
+    """Serves messages with actions and the starts of the next episodes."""
     # Ctrl-C reaches the whole process group; only the trainer handles it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     use_one_thread()
@@ -43,13 +43,13 @@ def _work(
     gc.freeze()
     try:
         while (message := pipe.recv()) is not None:
-            actions, next_plans = message
+            actions, starts = message
             if actions is None:
                 for i in range(len(seeds)):
-                    batch.reset(i, random[i], next_plans[i])
+                    batch.reset(i, random[i], *starts[i])
                 pipe.send(batch.observe())
             else:
-                pipe.send(_step(batch, actions, next_plans, random))
+                pipe.send(_step(batch, actions, starts, random))
     except (EOFError, ConnectionError):
         pass  # The trainer is gone.
 
@@ -57,7 +57,7 @@ def _work(
 def _step(
     batch: TrackingBatch,
     actions: NDArray[np.float32],
-    next_plans: list[int],
+    starts: list[Start],
     random: list[np.random.Generator],
 ) -> tuple[Any, ...]:
     """Steps all robots and resets those whose episodes ended, as VecEnv requires.
@@ -67,16 +67,17 @@ def _step(
     terms, terminated, truncated = batch.step(actions)
     observations = batch.observe()
     done = terminated | truncated
-    infos: list[dict[str, Any]] = [{} for _ in next_plans]
+    infos: list[dict[str, Any]] = [{} for _ in starts]
     ended = np.flatnonzero(done)
     for i in ended:
         infos[i] = {
             "plan": int(batch.plan[i]),
+            "samples": (int(batch.start[i]), int(batch.sample[i])),
             "retried": bool(terminated[i]) and random[i].random() < _RETRIED,
             "TimeLimit.truncated": bool(truncated[i]),
             "terminal_observation": observations[i].copy(),
         }
-        plan, sample = next_plans[i], None
+        plan, sample = starts[i]
         if infos[i]["retried"]:
             lead = int(random[i].integers(*_LEAD))
             plan, sample = int(batch.plan[i]), max(0, int(batch.sample[i]) - lead)
@@ -90,7 +91,7 @@ class WorkerVecEnv(VecEnv):
     """``workers * per_worker`` environments for stable-baselines3.
 
     Many environments per worker process amortise pipes and inference. The sampler draws
-    the plan of each episode and is told how it went; ``seed`` is of all else.
+    the start of each episode and is told how it went; ``seed`` is of all else.
 
     Raises:
         ChildProcessError: from stepping, if a worker process was killed.
@@ -115,7 +116,7 @@ class WorkerVecEnv(VecEnv):
         self._per_worker = per_worker
         self._reward_scale = reward_scale
         # What each environment goes on with when its episode is over.
-        self._next_plans = [sampler.draw() for _ in range(self.num_envs)]
+        self._starts = [sampler.draw_start() for _ in range(self.num_envs)]
         # Episodes that are another try: too hard to be counted.
         self._retrying = np.zeros(self.num_envs, dtype=bool)
         self._returns = np.zeros(self.num_envs)
@@ -139,7 +140,7 @@ class WorkerVecEnv(VecEnv):
     def reset(self) -> NDArray[np.float32]:
         """Starts a new episode everywhere; returns observations (num_envs, size)."""
         self._send(None)
-        self._next_plans = [self._sampler.draw() for _ in self._next_plans]
+        self._starts = [self._sampler.draw_start() for _ in self._starts]
         self._retrying[:] = False
         self._returns[:] = 0
         self._lengths[:] = 0
@@ -162,13 +163,15 @@ class WorkerVecEnv(VecEnv):
             info, total, length = infos[i], self._returns[i], int(self._lengths[i])
             # Steps lost to a fall count as 0; those cut off by the plan's end do not.
             steps = length if info["TimeLimit.truncated"] else self._episode_steps
+            failed = not info["TimeLimit.truncated"]
+            self._sampler.record_end(info["plan"], *info["samples"], failed=failed)
             if not self._retrying[i]:
                 share = length / self._episode_steps
                 self._sampler.record(info["plan"], total / steps, share)
             info["episode"] = {"r": 100 * total / steps, "l": length, "t": 0.0}
             self._retrying[i] = info["retried"]
             if not info["retried"]:
-                self._next_plans[i] = self._sampler.draw()
+                self._starts[i] = self._sampler.draw_start()
         self._returns[dones] = self._lengths[dones] = 0
         rewards = (returns - penalties).astype(np.float32) * self._reward_scale
         return observations, rewards, dones, infos
@@ -190,7 +193,7 @@ class WorkerVecEnv(VecEnv):
             own = slice(w * self._per_worker, (w + 1) * self._per_worker)
             theirs = None if actions is None else actions[own]
             try:
-                pipe.send((theirs, self._next_plans[own]))
+                pipe.send((theirs, self._starts[own]))
             except OSError:  # a broken pipe
                 raise ChildProcessError(_DIED) from None
 

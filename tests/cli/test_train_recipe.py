@@ -15,6 +15,7 @@ environments: 2
 references: {trot: {labels: [dog-trot], count: 200, seconds: 3}}
 common: {ppo: {batch: 64, minibatch: 32, hidden: [16]}}
 stages: [{name: one, steps: 6400}, {name: two, steps: 6400}]
+evaluation: null
 """
 
 

@@ -1,7 +1,10 @@
 import numpy as np
 import pytest
 
+from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.failure_starts import FailureStarts
+from loco_drake.tracking.sampler import PlanSampler
+from loco_drake.tracking.workers import WorkerVecEnv
 
 PLAN_STARTS = 3  # bins that plans of 3 s can be started in
 
@@ -52,3 +55,31 @@ def test_without_failures_or_without_weight_all_bins_are_alike(weight, plans):
     if weight == 0:
         starts.record(0, 0, 40, failed=True)
     np.testing.assert_allclose(starts.probabilities(0, 3), 1 / 3)
+
+
+@pytest.mark.slow
+def test_episodes_start_where_others_failed(plans):
+    """Thrown about, all fail soon: starts are then where episodes ended, or before."""
+    sampler = PlanSampler(plans, 0, failure_weight=1.0, half_episode=10)
+    sampler.starts.rates[:, 2] = 1.0
+    environment = EnvironmentConfig(episode_steps=20, failure_weight=1.0)
+    workers = WorkerVecEnv(plans, environment, sampler, workers=1, per_worker=8, seed=0)
+    random = np.random.default_rng(0)
+    starts, retried, before = [], np.zeros(8, dtype=bool), sampler.starts.rates.copy()
+    try:
+        workers.reset()
+        for _ in range(60):
+            actions = random.uniform(-6, 6, (8, 12)).astype(np.float32)
+            _, _, dones, infos = workers.step(actions)
+            for i in np.flatnonzero(dones):
+                start, end = infos[i]["samples"]
+                assert start < end <= start + 20
+                starts += [] if retried[i] else [start]
+                retried[i] = infos[i]["retried"]
+    finally:
+        workers.close()
+    assert len(starts) > 20
+    # g = (1, 2, 4) / 7 of the rates that were set, and of similar ones later.
+    assert np.mean(np.array(starts) >= 50) > 0.6
+    assert max(starts) <= 150 - 10
+    assert not np.array_equal(sampler.starts.rates, before)

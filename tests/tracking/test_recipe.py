@@ -71,7 +71,8 @@ def test_all_stands_for_the_fifteen_and_each_label_is_taken_once(recipe):
 def test_a_recipe_is_written_as_it_is_read(robot, recipe, tmp_path):
     recipe.start_from = Path("go2")
     recipe.references["own"] = ReferenceSet(folder=Path("motions/own"))
-    for one in (recipe, read_recipe(Path(robot))):
+    silent = replace(recipe, evaluation=None)
+    for one in (recipe, silent, read_recipe(Path(robot))):
         write_recipe(one, tmp_path / "again.yaml")
         assert read_recipe(tmp_path / "again.yaml") == one
 
@@ -81,6 +82,7 @@ def test_a_share_of_a_recipe_has_that_share_of_steps_and_motions(recipe):
     assert [stage.steps for stage in part.stages] == [10, 5]
     assert [of.count for of in part.references.values()] == [1, 1]
     assert [stage.steps for stage in recipe.stages] == [1000, 500]
+    assert (recipe.evaluation.every, part.evaluation.every) == (1_000_000, 10_000)
     assert scaled(recipe, 1.0) == recipe
 
 
@@ -108,6 +110,8 @@ def test_shipped_recipes_need_no_more_steps_than_their_budget(robot):
         ("references: [plain]", "references: [slow]", "plain, fast"),
         ("labels: [all]", "labels: [cat-trot]", "dog-pace"),
         ("labels: [all]", "labels: []", "no labels"),
+        ("  plain: {", "  evaluation: {", "No references can be called 'evaluation'"),
+        ("seed: 5", "evaluation: {every: 0}", "every must be 1 or more"),
         ("count: 8", "count: 0", "count must be 1 or more"),
         ("fall_cost: 15", "fall: 15", "environment has the unknown field 'fall'"),
         ("fall_cost: 15", "robot: go2", "the robot is given once"),

@@ -218,6 +218,48 @@ def test_an_unprivileged_policy_can_start_from_a_privileged_one(
         train_tracker(plans, config(128), tmp_path, resume=True)
 
 
+def test_a_training_can_start_with_another_noise_and_hold_it(trained, plans, tmp_path):
+    """Only the standard deviation is not that of the networks it starts from."""
+    first = trained[0] / "checkpoint.safetensors"
+    name, noise = "module/log_std", torch.full((12,), -1.5)
+    for steps, learn_std in ((0, True), (64, False), (64, True)):
+        out = tmp_path / f"{steps}-{learn_std}"
+        other = config(steps, restart_log_std=-1.5, learn_std=learn_std)
+        train_tracker(plans, other, out, first=first)
+        begun = saved_in(out).tensors
+        held = steps == 0 or not learn_std
+        assert torch.equal(begun[name], noise) == held
+        if steps == 0:
+            theirs = saved_in(trained[0]).tensors
+            differ = {x for x in begun if x.startswith("module/")}
+            differ -= {x for x in differ if torch.equal(begun[x], theirs[x])}
+            assert differ == {name}
+
+
+def test_a_reward_for_entropy_keeps_noise_up(plans, tmp_path):
+    noise = {}
+    for entropy in (0.0, 1.0):
+        out = tmp_path / str(entropy)
+        train_tracker(plans, config(64, entropy=entropy), out)
+        noise[entropy] = saved_in(out).tensors["module/log_std"]
+    assert (noise[1.0] > noise[0.0]).all()
+
+
+def test_failures_of_starts_are_resumed(plans, tmp_path):
+    """Thrown about by noise, episodes fail; a resumed run knows where."""
+    other = config(64, log_std=1.0)
+    other.environment.failure_weight = 0.5
+    train_tracker(plans, other, tmp_path)
+    rates = saved_in(tmp_path).tensors["sampler/failure_rates"]
+    assert rates.shape == (2, 4)  # 151 samples
+    assert 0 < rates.max() < 1
+    train_tracker(plans, other, tmp_path, resume=True)
+    assert torch.equal(saved_in(tmp_path).tensors["sampler/failure_rates"], rates)
+    other.environment.failure_weight = 0.0
+    with pytest.raises(InputError, match=r"has --failure-weight 0.5, not 0.0;"):
+        train_tracker(plans, other, tmp_path, resume=True)
+
+
 def test_other_networks_and_observations_cannot_be_started_from(
     trained, plans, tmp_path
 ):
