@@ -57,7 +57,7 @@ class ToppraSmoother(PlanProducer):
         self._robot = robot
         self._config = config or SmootherConfig()
         self._config.check()
-        self._limits = limits or path_limits(robot)
+        self._limits = limits or path_limits(robot, self._config.fall)
         rest = standing_plan(robot)
         self._plan_in = self.DeclareAbstractInputPort("plan", Value(rest))
         self._DeclarePlan(no_progress(robot, 0.0))

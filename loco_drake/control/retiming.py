@@ -27,6 +27,8 @@ from loco_drake.models.robots import Robot
 # toppra logs infeasible problems as errors; here they are results.
 toppra.setup_logging("ERROR")
 
+GROUNDED_FALL = 2.0  # g, of the trunk
+
 # The path clock takes at least this long, in s, to slow from full speed to rest. It
 # decelerates the whole robot, which cannot brake in the air, nor on the ground beyond
 # friction.
@@ -41,7 +43,7 @@ class PathLimits:
     acceleration: Array  # lower and upper, shape (D, 2)
 
 
-def path_limits(robot: Robot) -> PathLimits:
+def path_limits(robot: Robot, fall: float = 1.0) -> PathLimits:
     """Returns the robot's limits on its joints (rad) and the height of its base (m).
 
     A joint can accelerate its leg by at most ``effort_limit / joint_inertia``. This
@@ -51,12 +53,16 @@ def path_limits(robot: Robot) -> PathLimits:
     The base cannot accelerate downward faster than gravity, since feet push but do not
     pull. Motion of something smaller than this robot violates this limit in flight;
     slowed until it satisfies the limit, it can be tracked.
+
+    Grounded motion needs a ``fall`` of :data:`GROUNDED_FALL`, in g: its centre of mass
+    falls as it should, but legs that are drawn up push the trunk down, and a spline
+    through samples overshoots where forces end at once.
     """
     joints = robot.effort_limits / robot.joint_inertia
     return PathLimits(
         speed=np.append(robot.joint_speed_limits, np.inf),
         acceleration=np.append(
-            np.stack((-joints, joints), axis=1), [[-GRAVITY, np.inf]], axis=0
+            np.stack((-joints, joints), axis=1), [[-fall * GRAVITY, np.inf]], axis=0
         ),
     )
 

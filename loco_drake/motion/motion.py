@@ -97,6 +97,11 @@ class Motion:
         return GaitLabel(self.source, self.gait)
 
     @property
+    def grounded(self) -> bool:
+        """Whether it was made to obey physics, see loco_drake.retargeting.grounding."""
+        return "momentum_error" in self.provenance
+
+    @property
     def duration(self) -> float:
         """Seconds from the first frame to the last."""
         return (len(self) - 1) / self.fps

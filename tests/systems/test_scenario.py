@@ -66,6 +66,7 @@ BAD = {
     "smoother: {chunk: .01}": "smoother's chunk must be a number from 0.08 to 1.4",
     "smoother: {chunk: 2}": "smoother's chunk",
     "smoother: {lookahead: .nan}": "smoother's lookahead must be a number from 0.16",
+    "smoother: {fall: 0}": "smoother's fall must be a number from 0.1",
     "simulator: {integration_scheme: cenic}": "only target_realtime_rate",
     "simulator: {target_realtime_rate: -1}": "target_realtime_rate must be",
     "visualization: {publish_period: 0}": "publish_period must be",
