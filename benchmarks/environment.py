@@ -141,9 +141,15 @@ def two_workers(
     plans: list[Plan], config: EnvironmentConfig, steps: int, turns: int
 ) -> dict[str, float]:
     """Returns steps/s of one worker and of two, and their ratio."""
-    sizes = {"per_worker": ROBOTS, "seed": 0}
     both = [
-        WorkerVecEnv(plans, config, PlanSampler(plans, 0), workers=workers, **sizes)
+        WorkerVecEnv(
+            plans,
+            config,
+            PlanSampler(plans, 0),
+            workers=workers,
+            per_worker=ROBOTS,
+            seed=0,
+        )
         for workers in (1, 2)
     ]
 

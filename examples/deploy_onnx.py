@@ -64,13 +64,25 @@ class Policy:
         if "deployment" not in metadata:
             raise SystemExit(f"{path} says not how to run it: export the policy anew.")
         self.about: dict[str, Any] = json.loads(metadata["deployment"])
+        self.memory = np.zeros(0)
+        self.begin()
+
+    def begin(self) -> None:
+        """Begins an episode: a policy with a history remembers nothing."""
+        memory = self.about.get("memory")
+        self.memory = np.zeros(memory["input"]["shape"][1] if memory else 0)
 
     def act(self, observation: Array) -> Array:
-        """Returns the action, shape (12,)."""
-        batch = observation[None].astype(np.float32)
-        (actions,) = self._session.run(["action"], {"observation": batch})
-        action: Array = actions[0].astype(np.float64)
-        return action
+        """Returns the action, shape (12,), and remembers what the network says."""
+        inputs = {"observation": observation}
+        if self.memory.size:
+            inputs["memory"] = self.memory
+        batches = {name: x[None].astype(np.float32) for name, x in inputs.items()}
+        action, *memory = self._session.run(None, batches)
+        if memory:
+            self.memory = memory[0][0].astype(np.float64)
+        result: Array = action[0].astype(np.float64)
+        return result
 
     def check(self) -> float:
         """Returns the largest error in the file's test vectors."""
@@ -81,7 +93,10 @@ class Policy:
             ahead["label"] = one_hot(self.about, case["label"])
             state = known["q"], known["v"], known["last_action"]
             observation = observe(self.about, ahead, *state)
+            self.memory = known.get("memory", self.memory)
             action = self.act(observation)
+            if "memory" in known:
+                errors.append(self.memory - known["next_memory"])
             errors += [observation - known["observation"], action - known["action"]]
             errors.append(self.target(known["set_points"], action) - known["target"])
         return max(float(np.abs(error).max()) for error in errors)
@@ -169,6 +184,7 @@ def deploy(policy: Policy, plan: dict[str, Array], robot: Robot) -> dict[str, An
     period = about["network"]["period_s"]
     steps = len(plan["q"]) - 1 - max(about["look_ahead"]["samples"])
     robot.place(plan["q"][0], plan["v"][0])
+    policy.begin()
     action = np.zeros(12)
     errors, fell = [np.zeros(12)], False
     for n in range(steps):

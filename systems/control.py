@@ -2,15 +2,20 @@
 
 from typing import Any
 
-import torch
+import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import Context, Diagram, LeafSystem, State
+from pydrake.systems.framework import (
+    Context,
+    Diagram,
+    LeafSystem,
+    State,
+    ValueProducer,
+)
 
-from loco_drake.common.determinism import single_thread
 from loco_drake.control.action import joint_targets, set_points
-from loco_drake.control.actor import Actor
+from loco_drake.control.actor import Actor, act
 from loco_drake.control.observation import OBSERVATION_SIZE, observe, preview
 from loco_drake.control.plan import PLAN_DT, Plan, standing_plan
 from loco_drake.control.reward import REWARD_TERMS, reward_terms
@@ -174,20 +179,45 @@ class TrackingPolicy(LeafSystem):
         output_ports:
         - action: vector (12,); ACTION_SCALE
 
-    The system has no state and no clock; :class:`JointTargets` samples it.
+    :class:`JointTargets` samples it. A policy with a memory (:meth:`Actor.step`) keeps
+    it in discrete state: zeros in a default Context, updated every PLAN_DT together
+    with the action. Others have neither state nor clock.
     """
 
     def __init__(self, actor: Actor) -> None:
         super().__init__()
         self._actor = actor
         self._observation = self.DeclareVectorInputPort("observation", OBSERVATION_SIZE)
-        self.DeclareVectorOutputPort("action", 12, self._calc)
+        self._nothing = np.zeros(0)
+        prerequisites = {self._observation.ticket()}
+        if actor.memory_size:
+            self._memory = self.DeclareDiscreteState(np.zeros(actor.memory_size))
+            prerequisites.add(self.discrete_state_ticket(self._memory))
+            # Unrestricted, so that the observation is still the one that was acted on:
+            # JointTargets changes the last action in the same phase.
+            self.DeclarePeriodicUnrestrictedUpdateEvent(PLAN_DT, 0.0, self._remember)
+        # Action and next memory are computed together, and needed by two.
+        self._step = self.DeclareCacheEntry(
+            "step",
+            ValueProducer(
+                allocate=lambda: AbstractValue.Make(()), calc=self._calc_step
+            ),
+            prerequisites,
+        )
+        self.DeclareVectorOutputPort("action", 12, self._calc, {self._step.ticket()})
+
+    def _calc_step(self, context: Context, output: AbstractValue) -> None:
+        memory = self._nothing
+        if self._actor.memory_size:
+            memory = context.get_discrete_state(self._memory).value()
+        output.set_value(act(self._actor, self._observation.Eval(context), memory))
 
     def _calc(self, context: Context, output: Any) -> None:
-        observation = torch.from_numpy(self._observation.Eval(context)).float()
-        # For user processes: a second torch thread would wait for a busy core.
-        with torch.inference_mode(), single_thread():
-            output.set_value(self._actor(observation).double().numpy())
+        output.set_value(self._step.Eval(context)[0])
+
+    def _remember(self, context: Context, state: State) -> None:
+        memory = self._step.Eval(context)[1]
+        state.get_mutable_discrete_state(self._memory).set_value(memory)
 
 
 class JointTargets(PlanFollower):

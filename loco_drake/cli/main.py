@@ -27,6 +27,7 @@ _COMMANDS = {
     "train generator": "train the GPT that generates tokens",
     "train tracker": "train the tracking policy with PPO",
     "train recipe": "train a tracking policy from nothing, in stages",
+    "train student": "train a policy without privileged observations, by a teacher",
     "train classifier": "train the transformer that classifies gaits",
     "export": "write a policy, a plan or a robot for use without Drake",
     "evaluate retargeting": "measure retargeted motion",

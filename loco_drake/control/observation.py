@@ -66,6 +66,12 @@ _PARTS = (
 # What a policy's weights record: names and sizes.
 OBSERVATION_LAYOUT = tuple((name, size) for name, size, _ in _PARTS)
 OBSERVATION_SIZE = sum(size for _, size in OBSERVATION_LAYOUT)
+_ENDS = np.cumsum([size for _, size in OBSERVATION_LAYOUT]).tolist()
+# Where each part is in the observation.
+PLACES = {
+    name: slice(end - size, end)
+    for (name, size), end in zip(OBSERVATION_LAYOUT, _ENDS, strict=True)
+}
 
 
 def _mirror() -> tuple[Integers, Array]:

@@ -4,13 +4,10 @@ import time
 from typing import Any
 
 import numpy as np
-import torch
 
-from loco_drake.common.arrays import Array
-from loco_drake.common.determinism import single_thread
 from loco_drake.common.errors import InputError
 from loco_drake.control.action import joint_targets, set_points
-from loco_drake.control.actor import Actor, load_actor
+from loco_drake.control.actor import act, load_actor
 from loco_drake.control.observation import observe, preview
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.reward import reward_terms
@@ -69,6 +66,7 @@ class MujocoRecorder:
     def _track(self, plan: Plan, steps: int) -> Rollout:
         robot, plant = self._robot, self._plant
         state, action = plan.state[plan.index(0.0)], np.zeros(12)
+        memory = np.zeros(self._actor.memory_size)
         plant.set_state(state)
         # Set-points of a period are recorded with the state at its end, as in Drake.
         states, desired = [state], [robot.stand_joints]
@@ -76,7 +74,7 @@ class MujocoRecorder:
         for k in range(steps):
             now = k * PLAN_DT
             seen = observe(robot, preview(plan, now), state, action)
-            action = _act(self._actor, seen)
+            action, memory = act(self._actor, seen, memory)
             due = set_points(robot, plan)[plan.index(now + PLAN_DT)]
             targets = joint_targets(due, action)[:12]
             state = plant.advance(targets, PLAN_DT)
@@ -98,9 +96,3 @@ class MujocoRecorder:
             steps=steps,
             fell=fell,
         )
-
-
-def _act(actor: Actor, observation: Array) -> Array:
-    with torch.inference_mode(), single_thread():
-        action: Array = actor(torch.from_numpy(observation).float()).double().numpy()
-    return action

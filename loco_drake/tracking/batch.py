@@ -110,16 +110,20 @@ class TrackingBatch:
         return terms, lost, ~lost & (self.sample >= self._last)
 
     def observe(
-        self, robots: NDArray[np.int64] | slice = slice(None)
+        self, robots: NDArray[np.int64] | slice = slice(None), *, exact: bool = False
     ) -> NDArray[np.float32]:
-        """Returns observations (B, OBSERVATION_SIZE), or those of some robots."""
+        """Returns observations (B, OBSERVATION_SIZE), or those of some robots.
+
+        They are those of the measured state, or if ``exact`` of the true one.
+        """
         plan, sample = self.plan[robots], self.sample[robots]
         first, last = self._first[plan], self._lengths[plan] - 1
         ahead = np.minimum(sample[:, None] + LOOK_AHEAD, last[:, None])
         rows = first[:, None] + ahead
         q, v = split(self._wanted[rows])
         shown = Preview(q, v, self._contacts[rows], self._labels[first + sample])
-        state, action = self._measured(robots), self._action[robots]
+        state = self._state[robots] if exact else self._measured(robots)
+        action = self._action[robots]
         return observe(self._robot, shown, state, action).astype(np.float32)
 
     def _measured(self, robots: NDArray[np.int64] | slice) -> Array:

@@ -197,3 +197,51 @@ class TrainingConfig:
         check_at_least("per_worker", self.per_worker, 1)
         self.environment.check()
         self.ppo.check(self.workers * self.per_worker)
+
+
+@dataclass(kw_only=True)
+class StudentConfig:
+    """Configuration of a student's training."""
+
+    # Environment steps of the training, rounded up to whole batches.
+    steps: int = 1_000_000
+    # Worker processes.
+    workers: int = 2
+    # Robots that each worker simulates.
+    per_worker: int = 16
+    # Seed of all random numbers.
+    seed: int = 0
+    # Environment steps between updates. An interruption loses at most one batch.
+    batch: int = 4096
+    # Samples per update.
+    minibatch: int = 1024
+    # Updates per batch.
+    updates: int = 32
+    # Initial learning rate; decays to 0 as a half cosine.
+    learning_rate: float = 1e-3
+    # Samples that are kept to learn from.
+    capacity: int = 262_144
+    # Share of the steps over which the teacher's share of the actions falls from 1 to
+    # 0.
+    handover: float = 0.05
+    # Measurements that the student remembers besides the present one, one each 20 ms.
+    history: int = 10
+    # The environment.
+    environment: Annotated[EnvironmentConfig, tyro.conf.arg(name="")] = field(
+        default_factory=EnvironmentConfig
+    )
+
+    def check(self) -> None:
+        """Raises InputError unless a training can begin."""
+        for name in ("workers", "per_worker", "minibatch", "updates", "history"):
+            check_at_least(name, getattr(self, name), 1)
+        robots = self.workers * self.per_worker
+        if self.batch < robots:
+            raise InputError(
+                f"--batch must be at least {robots}, a step of each environment, not "
+                f"{self.batch}."
+            )
+        check_at_least("capacity", self.capacity, self.batch)
+        check_bounds("--learning-rate", self.learning_rate, 0, 1, above=True)
+        check_bounds("--handover", self.handover, 0, 1)
+        self.environment.check()

@@ -13,6 +13,7 @@ from loco_drake.control.observation import (
     LOOK_AHEAD,
     OBSERVATION_LAYOUT,
     OBSERVATION_SIZE,
+    PLACES,
 )
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.state import MAX_TILT
@@ -86,6 +87,7 @@ def deployment(actor: Actor, robot: Robot) -> dict[str, Any]:
             "type": "float32",
             "period_s": 1 / config.rate,
         },
+        "memory": _memory(actor),
         "state": {
             "q": ["R_WB as w, x, y, z", "p_WB in m", "q_J in rad"],
             "v": ["w_WB_W in rad/s", "v_WB_W in m/s", "v_J in rad/s"],
@@ -93,7 +95,7 @@ def deployment(actor: Actor, robot: Robot) -> dict[str, Any]:
             "H": "at B, z up, x that of B in the plane",
             "W": "z up, ground at z = 0",
         },
-        "observation": _observation(config.privileged),
+        "observation": _observation(actor),
         "look_ahead": {
             "samples": SAMPLES["ahead"],
             "period_s": PLAN_DT,
@@ -152,20 +154,39 @@ def deployment(actor: Actor, robot: Robot) -> dict[str, Any]:
     }
 
 
-def _observation(privileged: bool) -> list[dict[str, Any]]:
+def ignored_parts(actor: Actor) -> tuple[str, ...]:
+    """Returns the parts of the observation that make no difference to the action."""
+    if actor.config.privileged:
+        return ()
+    # With a history, the plan's own motion and height are taken from the other two;
+    # the robot's position in them makes no difference.
+    return PRIVILEGED if actor.config.history is None else ("v_WB_H",)
+
+
+def _memory(actor: Actor) -> dict[str, Any] | None:
+    """Returns what the network is to be given back, or None."""
+    if not actor.memory_size:
+        return None
+    shape = ["N", actor.memory_size]
+    return {
+        "input": {"name": "memory", "shape": shape},
+        "output": {"name": "next_memory", "shape": shape},
+        "start": "zeros",
+        "p_WB": "of no consequence, may be zeros",
+    }
+
+
+def _observation(actor: Actor) -> list[dict[str, Any]]:
     """Returns the parts in order, with the place of each in the observation."""
-    parts, start = [], 0
-    for name, size in OBSERVATION_LAYOUT:
-        part = PARTS[name]
-        parts.append(
-            {
-                "name": name,
-                "start": start,
-                "size": size,
-                **part._asdict(),
-                "samples": SAMPLES[part.samples],
-                "ignored": not privileged and name in PRIVILEGED,
-            }
-        )
-        start += size
-    return parts
+    ignored = ignored_parts(actor)
+    return [
+        {
+            "name": name,
+            "start": PLACES[name].start,
+            "size": size,
+            **PARTS[name]._asdict(),
+            "samples": SAMPLES[PARTS[name].samples],
+            "ignored": name in ignored,
+        }
+        for name, size in OBSERVATION_LAYOUT
+    ]

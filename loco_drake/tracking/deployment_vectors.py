@@ -3,12 +3,11 @@
 from typing import Any
 
 import numpy as np
-import torch
 
 from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import quat_exp, quat_multiply, yaw_quat
 from loco_drake.control.action import joint_targets, set_points
-from loco_drake.control.actor import Actor
+from loco_drake.control.actor import Actor, act
 from loco_drake.control.observation import LOOK_AHEAD, observe, preview
 from loco_drake.control.plan import PLAN_DT, Plan, make_plan
 from loco_drake.control.state import ORIENTATION, split, unit_base
@@ -30,16 +29,26 @@ def make_vectors(actor: Actor, robot: Robot) -> list[dict[str, Any]]:
     - label: the plan's
     - observation, action (12,), set_points (12,) of the plan, and target (12,), what
       the PD is given
+    - of a policy with a history memory and next_memory; in the first situation an
+      episode begins
     """
     random = np.random.default_rng(0)
     labels = actor.config.labels
-    return [
-        _vector(actor, robot, random, labels[i % len(labels)]) for i in range(COUNT)
-    ]
+    vectors = []
+    for i in range(COUNT):
+        memory = random.standard_normal(actor.memory_size) * (i > 0)
+        memory[:1] = np.sign(i)  # whether the episode has begun
+        label = labels[i % len(labels)]
+        vectors.append(_vector(actor, robot, random, label, memory))
+    return vectors
 
 
 def _vector(
-    actor: Actor, robot: Robot, random: np.random.Generator, label: str
+    actor: Actor,
+    robot: Robot,
+    random: np.random.Generator,
+    label: str,
+    memory: Array,
 ) -> dict[str, Any]:
     plan = _plan(robot, random, any_label(label).index)
     state = unit_base(plan.state[0] + 0.05 * random.standard_normal(37))
@@ -48,8 +57,7 @@ def _vector(
     last_action = random.standard_normal(12)
     ahead = preview(plan, 0.0)
     observation = observe(robot, ahead, state, last_action)
-    with torch.inference_mode():
-        action = actor(torch.from_numpy(observation).float()).double().numpy()
+    action, next_memory = act(actor, observation, memory)
     due = set_points(robot, plan)[1]
     q, v = split(state)
     values: dict[str, Array] = {
@@ -65,6 +73,8 @@ def _vector(
         "set_points": due,
         "target": joint_targets(due, action)[:12],
     }
+    if actor.memory_size:
+        values |= {"memory": memory, "next_memory": next_memory}
     return {"label": label, **{name: x.tolist() for name, x in values.items()}}
 
 

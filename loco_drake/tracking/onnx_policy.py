@@ -6,17 +6,18 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from torch import Tensor, nn
 
 from loco_drake import __version__
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import atomic_path
 from loco_drake.control.action import velocity_gain
-from loco_drake.control.actor import PRIVILEGED, Actor
+from loco_drake.control.actor import Actor
 from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.datasets.registry import DATASETS
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import any_label
-from loco_drake.tracking.deployment import deployment
+from loco_drake.tracking.deployment import deployment, ignored_parts
 
 SET_POINTS = (
     "every 1 / rate s: q_d = q + (velocity_gain v + tau) / kp + action_scale * action, "
@@ -56,7 +57,7 @@ def policy_metadata(actor: Actor, robot: Robot) -> dict[str, str]:
         "labels": config.labels,
         "rate": config.rate,
         "observation_layout": config.observation_layout,
-        "ignored_parts": [] if config.privileged else list(PRIVILEGED),
+        "ignored_parts": list(ignored_parts(actor)),
         "joint_names": list(robot.joint_names),
         "standing_joints": robot.stand_joints.tolist(),
         "kp": robot.kp.tolist(),
@@ -74,12 +75,24 @@ def policy_metadata(actor: Actor, robot: Robot) -> dict[str, str]:
     }
 
 
+class _Step(nn.Module):
+    """:meth:`Actor.step` as a module."""
+
+    def __init__(self, actor: Actor) -> None:
+        super().__init__()
+        self._actor = actor
+
+    def forward(self, observation: Tensor, memory: Tensor) -> tuple[Tensor, Tensor]:
+        return self._actor.step(observation, memory)
+
+
 def export_onnx(actor: Actor, robot: Robot, path: Path) -> dict[str, str]:
     """Writes a policy as ONNX and returns its metadata.
 
     The network maps raw observations "observation" (N, OBSERVATION_SIZE) to "action"
     (N, 12), in 32 bits, for any N. Normalization, clipping and mirror symmetry are
-    included.
+    included. A policy with a history has the input "memory" and the output
+    "next_memory", too, (N, memory_size) each.
 
     Raises:
         InputError: if the packages of the extra ``onnx`` are not installed.
@@ -94,14 +107,22 @@ def export_onnx(actor: Actor, robot: Robot, path: Path) -> dict[str, str]:
         ) from None
     # It tells of operators of packages that are not installed.
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)
+    sizes, outputs = {"observation": OBSERVATION_SIZE}, ["action"]
+    dimensions = {"observation": {0: torch.export.Dim("robots")}}
+    network: nn.Module = actor
+    if actor.memory_size:
+        sizes["memory"] = actor.memory_size
+        dimensions["memory"] = {0: torch.export.Dim.AUTO}  # the same number
+        outputs.append("next_memory")
+        network = _Step(actor)
     program = torch.onnx.export(
-        actor.eval(),
-        (torch.zeros(2, OBSERVATION_SIZE),),
+        network.eval(),
+        tuple(torch.zeros(2, size) for size in sizes.values()),
         dynamo=True,
         verbose=False,
-        input_names=["observation"],
-        output_names=["action"],
-        dynamic_shapes={"observation": {0: torch.export.Dim("robots")}},
+        input_names=list(sizes),
+        output_names=outputs,
+        dynamic_shapes=dimensions,
     )
     assert program is not None
     model = program.model_proto

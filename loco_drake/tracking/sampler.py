@@ -1,8 +1,11 @@
 """Sampling of plans for episodes, which favours gaits with low returns."""
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
+from loco_drake.common.run_folder import Checkpoint
 from loco_drake.control.plan import Plan
 from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.tracking.failure_starts import FailureStarts
@@ -14,6 +17,8 @@ _PLAN_MEMORY = 0.6  # the same of a plan's score: it is drawn seldom
 _LEAST, _MOST = 0.1, 0.8
 _MOST_OF_PLAN = 0.5  # within a label; a plan that nobody could follow is to be no sink
 _SHORTEST = 0.05  # share of an episode that the shortest are taken to last
+_SCORES = ("scores", "shares", "plan_scores", "plan_shares")  # of a checkpoint
+_FAILURES = "sampler/failure_rates"
 
 
 # A plan's index, and the sample of it to start at, None where the environment draws it.
@@ -109,3 +114,22 @@ class PlanSampler:
             own = self.plan_scores[drawn & (self._labels == i)]
             means[str(ROW_LABELS[i])] = 100 * float(own.mean()) if len(own) else 0.0
         return means
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Returns the scores for a checkpoint, "sampler/NAME"."""
+        scores = {f"sampler/{n}": torch.from_numpy(getattr(self, n)) for n in _SCORES}
+        if self.starts is None:
+            return scores
+        return {**scores, _FAILURES: torch.from_numpy(self.starts.rates)}
+
+    def restore(self, saved: Checkpoint) -> None:
+        """Restores what a checkpoint holds: scores, and "sampler_random" as state."""
+        for name in _SCORES:
+            scores = saved.tensors[f"sampler/{name}"].numpy()
+            own = getattr(self, name)
+            # Checkpoints of before know fewer labels, and may be of other plans.
+            if not name.startswith("plan") or len(own) == len(scores):
+                own[: len(scores)] = scores
+        if self.starts is not None:
+            self.starts.rates[:] = saved.tensors[_FAILURES].numpy()
+        self.random.bit_generator.state = saved.state["sampler_random"]

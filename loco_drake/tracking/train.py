@@ -36,11 +36,6 @@ from loco_drake.tracking.workers import WorkerVecEnv
 
 POLICY = "policy.safetensors"
 
-# State of the sampler.
-_SCORES = ("scores", "shares", "plan_scores", "plan_shares")
-_FAILURES = "sampler/failure_rates"
-
-
 # Is told the environment steps so far, and the mean normalized return of recent
 # training episodes by label, 0-100.
 Report = Callable[[int, dict[str, float]], None]
@@ -174,11 +169,7 @@ def _state(
     tensors["normalizer/mean"] = torch.from_numpy(statistics.mean)
     tensors["normalizer/variance"] = torch.from_numpy(statistics.var)
     tensors["random/numpy"] = torch.from_numpy(np.asarray(keys).astype(np.int64))
-    for name in _SCORES:
-        tensors[f"sampler/{name}"] = torch.from_numpy(getattr(sampler, name))
-    if sampler.starts is not None:
-        tensors[_FAILURES] = torch.from_numpy(sampler.starts.rates)
-    return tensors, {
+    return tensors | sampler.tensors(), {
         "steps": learner.num_timesteps,
         "learning_rate": learner.rate,
         "normalizer_count": float(statistics.count),
@@ -192,15 +183,7 @@ def _restore(learner: AdaptivePPO, sampler: PlanSampler, saved: Checkpoint) -> N
     of_checkpoint(saved).load(learner)
     run_folder.restore_learning(saved, learner.policy, learner.policy.optimizer)
     with run_folder.sound(saved.path):
-        for name in _SCORES:
-            scores = saved.tensors[f"sampler/{name}"].numpy()
-            own = getattr(sampler, name)
-            # Checkpoints of before know fewer labels, and may be of other plans.
-            if not name.startswith("plan") or len(own) == len(scores):
-                own[: len(scores)] = scores
-        if sampler.starts is not None:
-            sampler.starts.rates[:] = saved.tensors[_FAILURES].numpy()
-        sampler.random.bit_generator.state = saved.state["sampler_random"]
+        sampler.restore(saved)
         position, has_gauss, gauss = saved.state["numpy_random"]
         keys = saved.tensors["random/numpy"].numpy().astype(np.uint32)
         np.random.set_state(("MT19937", keys, position, has_gauss, gauss))  # noqa: NPY002

@@ -8,17 +8,22 @@ from itertools import chain
 from multiprocessing.connection import Connection
 from typing import Any
 
+import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from loco_drake.common.determinism import use_one_thread
+from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.control.plan import Plan
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
 from loco_drake.tracking.sampler import PlanSampler, Start
 
+TWO_OBSERVATIONS_SPACE = gymnasium.spaces.Box(
+    -np.inf, np.inf, (2 * OBSERVATION_SIZE,), np.float32
+)
 # Share of the terminated episodes that are retried from a number of samples before the
 # failure, so that difficult moments are practised most.
 _RETRIED = 0.5
@@ -32,6 +37,7 @@ def _work(
     plans: list[Plan],
     config: EnvironmentConfig,
     seeds: list[int],
+    exact: bool,
 ) -> None:
     """Serves messages with actions and the starts of the next episodes."""
     # Ctrl-C reaches the whole process group; only the trainer handles it.
@@ -47,11 +53,21 @@ def _work(
             if actions is None:
                 for i in range(len(seeds)):
                     batch.reset(i, random[i], *starts[i])
-                pipe.send(batch.observe())
+                pipe.send(_observe(batch, exact))
             else:
-                pipe.send(_step(batch, actions, starts, random))
+                pipe.send(_step(batch, actions, starts, random, exact))
     except (EOFError, ConnectionError):
         pass  # The trainer is gone.
+
+
+def _observe(
+    batch: TrackingBatch,
+    exact: bool,
+    robots: NDArray[np.int64] | slice = slice(None),
+) -> NDArray[np.float32]:
+    """Returns observations as measured and, if wanted, behind them exact ones."""
+    seen = batch.observe(robots)
+    return np.hstack((seen, batch.observe(robots, exact=True))) if exact else seen
 
 
 def _step(
@@ -59,13 +75,14 @@ def _step(
     actions: NDArray[np.float32],
     starts: list[Start],
     random: list[np.random.Generator],
+    exact: bool,
 ) -> tuple[Any, ...]:
     """Steps all robots and resets those whose episodes ended, as VecEnv requires.
 
     Returns observations, rewards without penalties, penalties, dones and infos.
     """
     terms, terminated, truncated = batch.step(actions)
-    observations = batch.observe()
+    observations = _observe(batch, exact)
     done = terminated | truncated
     infos: list[dict[str, Any]] = [{} for _ in starts]
     ended = np.flatnonzero(done)
@@ -83,7 +100,7 @@ def _step(
             plan, sample = int(batch.plan[i]), max(0, int(batch.sample[i]) - lead)
         batch.reset(int(i), random[i], plan, sample)
     if len(ended):
-        observations[ended] = batch.observe(ended)
+        observations[ended] = _observe(batch, exact, ended)
     return observations, terms.sum(axis=-1), batch.penalty, done, infos
 
 
@@ -91,7 +108,9 @@ class WorkerVecEnv(VecEnv):
     """``workers * per_worker`` environments for stable-baselines3.
 
     Many environments per worker process amortise pipes and inference. The sampler draws
-    the start of each episode and is told how it went; ``seed`` is of all else.
+    the plan of each episode and is told how it went; ``seed`` is of all else. If
+    ``exact``, observations (OBSERVATION_SIZE,) are followed by those of the true state,
+    without the sensors' errors.
 
     Raises:
         ChildProcessError: from stepping, if a worker process was killed.
@@ -109,8 +128,10 @@ class WorkerVecEnv(VecEnv):
         per_worker: int,
         seed: int,
         reward_scale: float = 1.0,
+        exact: bool = False,
     ) -> None:
-        super().__init__(workers * per_worker, OBSERVATION_SPACE, ACTION_SPACE)
+        space = TWO_OBSERVATIONS_SPACE if exact else OBSERVATION_SPACE
+        super().__init__(workers * per_worker, space, ACTION_SPACE)
         self._sampler = sampler
         self._episode_steps = config.episode_steps
         self._per_worker = per_worker
@@ -130,7 +151,7 @@ class WorkerVecEnv(VecEnv):
             ours, theirs = context.Pipe()
             own = seeds[w * per_worker : (w + 1) * per_worker]
             process = context.Process(
-                target=_work, args=(theirs, plans, config, own), daemon=True
+                target=_work, args=(theirs, plans, config, own, exact), daemon=True
             )
             process.start()
             theirs.close()

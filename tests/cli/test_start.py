@@ -28,7 +28,8 @@ def test_help_waits_for_no_slow_library(name, tmp_path):
     printed = run_python("-c", HELP, *name.split(), cwd=tmp_path)
     assert f"loco-drake {name}" in printed
     # Bounds of its worlds come from a robot's model, which takes .2 s.
-    drake = " pydrake" if name in ("evaluate tracking", "train tracker") else ""
+    worlds = ("evaluate tracking", "train tracker", "train student")
+    drake = " pydrake" if name in worlds else ""
     assert printed.splitlines()[-1] == f"imported:{drake}"
 
 

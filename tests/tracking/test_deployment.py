@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.control.actor import PRIVILEGED, Actor, ActorConfig
+from loco_drake.control.actor import PRIVILEGED, ActorConfig
+from loco_drake.control.actor import make_actor as make_network
 from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
 from loco_drake.models.robots import ROBOTS, get_robot
 from loco_drake.motion.gaits import GAITS, SOURCES, any_label
@@ -21,7 +22,7 @@ def make_actor(robot, **config):
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(1)
         labels = ["dog-trot", "horse-walk", "cat-leap"]
-        return Actor(ActorConfig(robot=robot, labels=labels, **config))
+        return make_network(ActorConfig(robot=robot, labels=labels, **config))
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
@@ -52,6 +53,25 @@ def test_it_marks_what_a_policy_ignores(go2):
     about = deployment(make_actor("go2", privileged=False), go2)
     ignored = [part["name"] for part in about["observation"] if part["ignored"]]
     assert ignored == list(PRIVILEGED)
+    assert about["memory"] is None
+
+
+def test_it_tells_of_a_memory(go2):
+    actor = make_actor("go2", privileged=False, history=2)
+    about = deployment(actor, go2)
+    ignored = [part["name"] for part in about["observation"] if part["ignored"]]
+    assert ignored == ["v_WB_H"]
+    assert about["memory"]["input"] == {"name": "memory", "shape": ["N", 149]}
+    assert about["memory"]["output"]["shape"] == ["N", 149]
+    first, *others = about["test_vectors"]
+    assert not any(first["memory"])
+    for case in (first, *others):
+        inputs = (torch.tensor(case[k])[None] for k in ("observation", "memory"))
+        with torch.inference_mode():
+            results = actor.step(*inputs)
+        for name, value in zip(("action", "next_memory"), results, strict=True):
+            np.testing.assert_allclose(value[0], case[name], atol=1e-6)
+    assert all(case["memory"][0] == 1 for case in others)
 
 
 def toes(about, joints):

@@ -8,10 +8,16 @@ import pytest
 import torch
 
 from loco_drake.cli.main import main
-from loco_drake.control.actor import Actor, ActorConfig, load_actor, save_actor
+from loco_drake.control.actor import (
+    Actor,
+    ActorConfig,
+    load_actor,
+    make_actor,
+    save_actor,
+)
 from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
 from loco_drake.models.robots import get_robot
-from loco_drake.tracking.onnx_policy import policy_metadata
+from loco_drake.tracking.onnx_policy import export_onnx, policy_metadata
 
 
 @pytest.fixture(scope="module")
@@ -118,3 +124,26 @@ def test_without_the_extra_one_sentence_says_what_to_install(
         "extra 'onnx' of loco_drake.\n"
     )
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_policy_with_a_history_is_given_back_its_memory(tmp_path):
+    """An episode of three robots, step by step, as by the network in the diagram."""
+    config = ActorConfig(robot="go2", labels=[], hidden=[16], privileged=False)
+    actor = make_actor(replace(config, labels=["dog-trot"], history=5)).eval()
+    path = tmp_path / "policy.onnx"
+    metadata = export_onnx(actor, get_robot("go2"), path)
+    assert json.loads(metadata["ignored_parts"]) == ["v_WB_H"]
+    session = onnxruntime.InferenceSession(path)
+    random = torch.Generator().manual_seed(0)
+    run = torch.randn(8, 3, OBSERVATION_SIZE, generator=random)
+    memory, expected = np.zeros((3, actor.memory_size), dtype=np.float32), None
+    for observation in run:
+        with torch.inference_mode():
+            expected = actor.step(
+                observation,
+                torch.zeros(3, actor.memory_size) if expected is None else expected[1],
+            )
+        inputs = {"observation": observation.numpy(), "memory": memory}
+        action, memory = session.run(["action", "next_memory"], inputs)
+        np.testing.assert_allclose(action, expected[0], rtol=0, atol=1e-5)
+        np.testing.assert_allclose(memory, expected[1], rtol=0, atol=1e-5)

@@ -1,0 +1,82 @@
+"""``loco-drake train student``: trains a policy without privileged observations."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import fmean
+from typing import Annotated, ClassVar
+
+from loco_drake.cli.options import Json, option
+from loco_drake.cli.output import print_table, write_results
+from loco_drake.cli.training import print_stopped
+from loco_drake.common.errors import InputError, check_at_least
+from loco_drake.common.progress import progress_bar
+from loco_drake.tracking.config import StudentConfig
+
+
+@dataclass(kw_only=True)
+class TrainStudent(StudentConfig):
+    """Teach a policy that needs no privileged observations to act as one that has them.
+
+    It remembers its last measurements and estimates from them what it cannot measure
+    (DAgger). Ctrl-C stops the training; --resume continues from the last batch.
+    """
+
+    NAME: ClassVar[str] = "student"
+    # Policy to learn from: a shipped one (go2, a1, ...), or the policy.safetensors of
+    # a run; by default the robot's main policy.
+    teacher: Annotated[Path | None, option(metavar="POLICY|FILE")] = None
+    # Folder of Motion files to track, such as `generate` writes. Required
+    # without --resume.
+    references: Annotated[Path | None, option(metavar="PATH")] = None
+    # Folder for the checkpoint, policy and TensorBoard logs.
+    out: Path = Path("runs/student")
+    # Randomize friction, masses, motors, latency, pushes and sensor noise in each
+    # episode. Parts without a range of their own use the standard range.
+    randomize: bool = False
+    # Continue from the checkpoint in --out with the options of that run. Only --steps
+    # may increase.
+    resume: bool = False
+    json: Json = None
+
+    def run(self) -> int:
+        """Trains, prints and writes; returns the exit status."""
+        from loco_drake.common.run_folder import check_folder, options_of
+        from loco_drake.models.robots import get_robot
+        from loco_drake.models.shipped import training_path
+        from loco_drake.tracking.references import load_references
+        from loco_drake.tracking.train import POLICY
+        from loco_drake.tracking.train_student import train_student
+
+        check_at_least("steps", self.steps, 1)
+        environment = self.environment
+        if self.randomize:
+            environment.randomization = environment.randomization.with_standard()
+        self.check()
+        robot = get_robot(environment.robot)
+        check_folder(self.out, POLICY, self.resume)
+        teacher = training_path(self.teacher or Path(robot.name))
+        if self.references is None:
+            raise InputError("--references must name a folder of Motion files.")
+        plans = load_references(robot, self.references)
+        with progress_bar() as bar:
+            task = bar.add_task("student", total=self.steps, note="")
+
+            def report(steps: int, scores: dict[str, float]) -> None:
+                note = f"return {fmean(scores.values()):.1f} of 100"
+                bar.update(task, completed=steps, note=note)
+
+            figures = train_student(
+                plans,
+                teacher,
+                self,
+                self.out,
+                resume=self.resume,
+                options=options_of(self),
+                report=report,
+            )
+        write_results(self.json, figures)
+        rows = [(label, f"{score:.1f}") for label, score in figures["scores"].items()]
+        print_table("Recent training returns, of 100", ("gait", "return"), rows)
+        if figures["interrupted"]:
+            return print_stopped(figures["steps"], self.steps)
+        return 0
