@@ -2,14 +2,11 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import fmean
 from typing import Annotated, ClassVar
 
 from loco_drake.cli.options import Json, option
-from loco_drake.cli.output import print_table, write_results
-from loco_drake.cli.training import print_stopped
-from loco_drake.common.errors import InputError, check_at_least
-from loco_drake.common.progress import progress_bar
+from loco_drake.cli.training import train_policy
+from loco_drake.common.errors import check_at_least
 from loco_drake.tracking.config import StudentConfig
 
 
@@ -41,9 +38,7 @@ class TrainStudent(StudentConfig):
     def run(self) -> int:
         """Trains, prints and writes; returns the exit status."""
         from loco_drake.common.run_folder import check_folder, options_of
-        from loco_drake.models.robots import get_robot
         from loco_drake.models.shipped import training_path
-        from loco_drake.tracking.references import load_references
         from loco_drake.tracking.train import POLICY
         from loco_drake.tracking.train_student import train_student
 
@@ -52,20 +47,11 @@ class TrainStudent(StudentConfig):
         if self.randomize:
             environment.randomization = environment.randomization.with_standard()
         self.check()
-        robot = get_robot(environment.robot)
         check_folder(self.out, POLICY, self.resume)
-        teacher = training_path(self.teacher or Path(robot.name))
-        if self.references is None:
-            raise InputError("--references must name a folder of Motion files.")
-        plans = load_references(robot, self.references)
-        with progress_bar() as bar:
-            task = bar.add_task("student", total=self.steps, note="")
-
-            def report(steps: int, scores: dict[str, float]) -> None:
-                note = f"return {fmean(scores.values()):.1f} of 100"
-                bar.update(task, completed=steps, note=note)
-
-            figures = train_student(
+        teacher = training_path(self.teacher or Path(environment.robot))
+        return train_policy(
+            self,
+            lambda plans, report: train_student(
                 plans,
                 teacher,
                 self,
@@ -73,10 +59,5 @@ class TrainStudent(StudentConfig):
                 resume=self.resume,
                 options=options_of(self),
                 report=report,
-            )
-        write_results(self.json, figures)
-        rows = [(label, f"{score:.1f}") for label, score in figures["scores"].items()]
-        print_table("Recent training returns, of 100", ("gait", "return"), rows)
-        if figures["interrupted"]:
-            return print_stopped(figures["steps"], self.steps)
-        return 0
+            ),
+        )

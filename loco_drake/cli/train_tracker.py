@@ -2,14 +2,11 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import fmean
 from typing import Annotated, ClassVar
 
 from loco_drake.cli.options import Json, option
-from loco_drake.cli.output import print_table, write_results
-from loco_drake.cli.training import print_stopped
-from loco_drake.common.errors import InputError, check_at_least
-from loco_drake.common.progress import progress_bar
+from loco_drake.cli.training import train_policy
+from loco_drake.common.errors import check_at_least
 from loco_drake.tracking.config import TrainingConfig
 
 
@@ -40,9 +37,7 @@ class TrainTracker(TrainingConfig):
     def run(self) -> int:
         """Trains, prints and writes; returns the exit status."""
         from loco_drake.common.run_folder import check_folder, options_of
-        from loco_drake.models.robots import get_robot
         from loco_drake.models.shipped import training_path
-        from loco_drake.tracking.references import load_references
         from loco_drake.tracking.train import POLICY, train_tracker
 
         check_at_least("steps", self.steps, 1)
@@ -52,17 +47,9 @@ class TrainTracker(TrainingConfig):
         self.check()
         check_folder(self.out, POLICY, self.resume)
         start = self.start_from and training_path(self.start_from)
-        if self.references is None:
-            raise InputError("--references must name a folder of Motion files.")
-        plans = load_references(get_robot(environment.robot), self.references)
-        with progress_bar() as bar:
-            task = bar.add_task("tracker", total=self.steps, note="")
-
-            def report(steps: int, scores: dict[str, float]) -> None:
-                note = f"return {fmean(scores.values()):.1f} of 100"
-                bar.update(task, completed=steps, note=note)
-
-            figures = train_tracker(
+        return train_policy(
+            self,
+            lambda plans, report: train_tracker(
                 plans,
                 self,
                 self.out,
@@ -70,10 +57,5 @@ class TrainTracker(TrainingConfig):
                 first=start,
                 options=options_of(self),
                 report=report,
-            )
-        write_results(self.json, figures)
-        rows = [(label, f"{score:.1f}") for label, score in figures["scores"].items()]
-        print_table("Recent training returns, of 100", ("gait", "return"), rows)
-        if figures["interrupted"]:
-            return print_stopped(figures["steps"], self.steps)
-        return 0
+            ),
+        )

@@ -2,16 +2,19 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from statistics import fmean
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import tyro
 
 from loco_drake.cli.options import Json
-from loco_drake.cli.output import print_table, say, write_json
+from loco_drake.cli.output import print_table, say, write_json, write_results
 from loco_drake.common.errors import InputError
+from loco_drake.common.progress import progress_bar
 from loco_drake.generation.loop_settings import LoopSettings
 
 if TYPE_CHECKING:
+    from loco_drake.control.plan import Plan
     from loco_drake.generation.training import LoopResult
 
 # Options that are not the run's: where it is, and what a call does.
@@ -27,6 +30,13 @@ class Scores(NamedTuple):
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     title: str = ""  # behind the name of the weights file
+
+
+# Trains on plans; calls the function that it is given with the steps so far and the
+# mean normalized returns of recent episodes by label, and returns figures.
+TrainPolicy = Callable[
+    ["list[Plan]", Callable[[int, dict[str, float]], None]], dict[str, Any]
+]
 
 
 # How a training ended, and what scores the network.
@@ -59,6 +69,37 @@ class NetworkTraining(LoopSettings):
     def learn(self) -> Learned:
         """Reads the motions and trains."""
         raise NotImplementedError
+
+
+def train_policy(command: Any, train: TrainPolicy) -> int:
+    """Trains a policy on ``command.references``, shows progress, prints and writes.
+
+    Returns 1 if it was stopped early, else 0.
+
+    Raises:
+        InputError: if there are no such references.
+    """
+    from loco_drake.models.robots import get_robot
+    from loco_drake.tracking.references import load_references
+
+    if command.references is None:
+        raise InputError("--references must name a folder of Motion files.")
+    robot = get_robot(command.environment.robot)
+    plans = load_references(robot, command.references)
+    with progress_bar() as bar:
+        task = bar.add_task(command.NAME, total=command.steps, note="")
+
+        def report(steps: int, scores: dict[str, float]) -> None:
+            note = f"return {fmean(scores.values()):.1f} of 100"
+            bar.update(task, completed=steps, note=note)
+
+        figures = train(plans, report)
+    write_results(command.json, figures)
+    rows = [(label, f"{score:.1f}") for label, score in figures["scores"].items()]
+    print_table("Recent training returns, of 100", ("gait", "return"), rows)
+    if figures["interrupted"]:
+        return print_stopped(figures["steps"], command.steps)
+    return 0
 
 
 def parse_resumed(command: Any, prog: str, args: Sequence[str]) -> Any:

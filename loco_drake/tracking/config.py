@@ -204,7 +204,7 @@ class StudentConfig:
     """Configuration of a student's training."""
 
     # Environment steps of the training, rounded up to whole batches.
-    steps: int = 1_000_000
+    steps: int = 500_000
     # Worker processes.
     workers: int = 2
     # Robots that each worker simulates.
@@ -214,9 +214,9 @@ class StudentConfig:
     # Environment steps between updates. An interruption loses at most one batch.
     batch: int = 4096
     # Samples per update.
-    minibatch: int = 1024
+    minibatch: int = 512
     # Updates per batch.
-    updates: int = 32
+    updates: int = 128
     # Initial learning rate; decays to 0 as a half cosine.
     learning_rate: float = 1e-3
     # Samples that are kept to learn from.

@@ -4,6 +4,8 @@ import pytest
 import torch
 
 from loco_drake.control.actor import Actor, ActorConfig, save_actor
+from loco_drake.motion.motion_file import save_motion
+from tests.synthetic_motion import synthetic_motion
 
 
 @pytest.fixture(scope="session")
@@ -18,4 +20,12 @@ def weights(tmp_path_factory):
             # Stretches the front legs and folds the rear ones.
             last.bias.copy_(bias * torch.tensor([0, 1, 1] * 2 + [0, -1, -1] * 2))
         save_actor(actor, folder / f"{name}.safetensors")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def references(tmp_path_factory):
+    """A folder with one Motion file of a Go2, a slow trot of two seconds."""
+    folder = tmp_path_factory.mktemp("references")
+    save_motion(synthetic_motion("dog-trot", 2.0, 0.3), folder / "trot.npz")
     return folder

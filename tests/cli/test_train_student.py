@@ -6,16 +6,7 @@ from loco_drake.cli.main import main
 from loco_drake.common.run_folder import read_checkpoint
 from loco_drake.control.actor import load_actor
 from loco_drake.models.robots import get_robot
-from loco_drake.motion.motion_file import save_motion
 from loco_drake.tracking.randomization import STANDARD
-from tests.synthetic_motion import synthetic_motion
-
-
-@pytest.fixture(scope="module")
-def references(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("references")
-    save_motion(synthetic_motion("dog-trot", 2.0, 0.3), folder / "trot.npz")
-    return folder
 
 
 def train(references, *options):

@@ -9,7 +9,8 @@ import onnx
 import pytest
 from pydrake.common.value import Value
 
-from loco_drake.control.actor import Actor, ActorConfig
+from loco_drake.control.actor import Actor, ActorConfig, act, make_actor
+from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.control.plan import PLAN_DT, make_plan
 from loco_drake.control.plan_file import save_plan
 from loco_drake.control.state import has_fallen
@@ -17,6 +18,7 @@ from loco_drake.models.robots import ROBOTS, get_robot
 from loco_drake.motion.gaits import LABELS
 from loco_drake.systems.control import Observation
 from loco_drake.tracking.deployment import deployment
+from loco_drake.tracking.onnx_policy import export_onnx
 
 pytest.importorskip("mujoco", reason="needs the extra 'mujoco'")
 
@@ -81,6 +83,21 @@ def test_it_tells_falls_as_the_package_does(example, go2):
     expected = has_fallen(go2, q)
     assert 50 < expected.sum() < 250
     assert [example.has_fallen(about, row) for row in q] == expected.tolist()
+
+
+def test_it_keeps_the_memory_of_a_policy_with_a_history(example, go2, tmp_path):
+    """Its test vectors hold, and an episode begins with nothing."""
+    labels = ["dog-trot"]
+    config = ActorConfig(robot="go2", labels=labels, privileged=False, history=3)
+    actor = make_actor(config)
+    export_onnx(actor, go2, tmp_path / "policy.onnx")
+    policy = example.Policy(tmp_path / "policy.onnx")
+    assert policy.check() < 1e-5
+    policy.begin()
+    memory = np.zeros(actor.memory_size)
+    for observation in np.random.default_rng(0).normal(size=(5, OBSERVATION_SIZE)):
+        expected, memory = act(actor, observation, memory)
+        np.testing.assert_allclose(policy.act(observation), expected, atol=1e-5)
 
 
 def test_a_file_that_is_missing_is_named(example, tmp_path, monkeypatch, capsys):
