@@ -108,7 +108,7 @@ class WorkerVecEnv(VecEnv):
     """``workers * per_worker`` environments for stable-baselines3.
 
     Many environments per worker process amortise pipes and inference. The sampler draws
-    the plan of each episode and is told how it went; ``seed`` is of all else. If
+    the start of each episode and is told how it went; ``seed`` is of all else. If
     ``exact``, observations (OBSERVATION_SIZE,) are followed by those of the true state,
     without the sensors' errors.
 
