@@ -9,6 +9,7 @@ need Chromium on the path (``chromium``, headless), `retargeting` the recordings
     python docs/draw.py library docs/images/library.png
     python docs/draw.py steering
     python docs/draw.py gait-choice docs/images/gait_choice.png
+    python docs/draw.py robustness docs/images/robustness.png
 
 ``loco-drake evaluate ... --figures`` draws the others.
 """
@@ -32,6 +33,9 @@ from loco_drake.datasets.segments import read_segments, select_labels
 from loco_drake.evaluation.dataset_picture import describe, library_figure
 from loco_drake.evaluation.gait_change import change_figure
 from loco_drake.evaluation.gait_choice_picture import choice_figure
+from loco_drake.evaluation.report.results import load_results, results_dir
+from loco_drake.evaluation.report.sections import disturbed_table
+from loco_drake.evaluation.robustness_pictures import curves_figure, levels_table
 from loco_drake.evaluation.steering_pictures import grid_figure, steering_figures
 from loco_drake.evaluation.tracking import Recorder, dress
 from loco_drake.generation.generate import generate_motions
@@ -230,6 +234,20 @@ def steering(
         write_figure(picture, folder / name, dpi=80)
 
 
+def robustness(png: Png) -> None:
+    """What both robots survive; also prints the tables of docs/robustness.md."""
+    found = load_results(results_dir()).of_robots("robustness")
+    write_figure(curves_figure(found), png, dpi=80)
+    for robot, figures in found.items():
+        table = disturbed_table(robot, figures)
+        rows = [(row.title, *(cell.text for cell in row.cells)) for row in table.rows]
+        whole = levels_table(figures.part("all").values)
+        for columns, lines in (((table.first, *table.columns), rows), whole):
+            for line in (columns, ["---"] * len(columns), *lines):
+                print(f"| {' | '.join(line)} |")
+            print()
+
+
 def gait_choice(png: Png) -> None:
     """The gait that a command chooses, by what ``evaluate steering`` measured."""
     gaits = {name: measured_gaits(get_robot(name)) for name in ROBOTS}
@@ -259,5 +277,6 @@ if __name__ == "__main__":
         "library": library,
         "steering": steering,
         "gait-choice": gait_choice,
+        "robustness": robustness,
     }
     tyro.extras.subcommand_cli_from_dict(pictures)

@@ -100,6 +100,36 @@ def steering(robot="go2", **changes):
     return {"robot": robot, "labels": labels, "all": figures}
 
 
+def robustness(robot="go2"):
+    """Two gaits, pushed from the left and on slippery ground."""
+
+    def curve(*levels):
+        return {
+            "levels": levels,
+            "success": [1.0, 0.75, 0.25],
+            "falls": [0.0, 0.25, 0.5],
+            "episodes": [2, 4, 4],
+            "level_80_percent": levels[1],
+            "level_80_percent_interval": [levels[0], levels[2]],
+            "level_80_percent_beyond": False,
+        }
+
+    pushes = curve(0.0, 8.0, 16.0)
+    ways = ("forward", "back", "left", "right")
+    curves = {name: pushes for name in ("push", *(f"push_{way}" for way in ways))}
+    figures = {
+        "impulse_80_percent_ns": 12.34,
+        "impulse_80_percent_interval_ns": [9.87, 15.6],
+        "impulse_80_percent_beyond": False,
+        "recovery_s": 0.456,
+        "success": {"undisturbed": 1.0, "push": 0.5, "friction": 0.52},
+        "episodes": 10,
+        "curves": {**curves, "friction": curve(0.8, 0.5, 0.3)},
+    }
+    labels = {label: figures for label in LABELS}
+    return {"robot": robot, "labels": labels, "all": figures}
+
+
 def learning(robot="go2"):
     curve = {
         "steps": [1000, 2000, 4_500_000],

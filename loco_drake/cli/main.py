@@ -35,6 +35,7 @@ _COMMANDS = {
     "evaluate generation": "compare generated with recorded motion",
     "evaluate tracking": "measure how well a policy tracks",
     "evaluate steering": "measure how well a policy follows commands",
+    "evaluate robustness": "measure what pushes, slopes and more a policy survives",
     "report": "write one HTML page of all results",
 }
 # Of most commands the module is called like them, "train_tracker".

@@ -11,6 +11,7 @@ from loco_drake.evaluation.report.results import results_dir
 from tests.report_results import (
     learning,
     retargeting,
+    robustness,
     steering,
     tokenizer,
     tracking,
@@ -58,6 +59,7 @@ def made(tmp_path_factory):
         tracking_go2_randomized=tracking(normalized_return=44.4, fall_rate=0.25),
         learning_go2=learning(),
         steering_go2=steering(),
+        robustness_go2=robustness(),
     )
     return make(folder, "--results", results, "--replays", "none")
 
@@ -117,10 +119,18 @@ def test_steering_shows_errors_beside_the_ranges_and_a_map(made):
     assert "--robot a1" not in part
 
 
+def test_disturbances_show_what_is_survived(made):
+    page, _ = made
+    part = section(page, "disturbances")
+    assert row(part, "dog-trot")[1:7] == ["12.3", "9.9", "15.6", "0.46", "100", "50"]
+    assert "Success of go2 against the size of each kind" in part
+    assert "loco-drake evaluate robustness --robot go2" in part
+
+
 def test_pictures_say_what_they_show(made):
     page, _ = made
     pictures = re.findall(r'<svg[^>]*role="img"[^>]*>', page)
-    assert len(pictures) == len(re.findall("<svg", page)) == 5
+    assert len(pictures) == len(re.findall("<svg", page)) == 6
     assert "at the end go2 dog 61, go2 solo8 93" in section(page, "figure-3")
     strips = section(page, "figure-1")
     assert strips.count("solo8-wave") >= 1

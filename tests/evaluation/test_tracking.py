@@ -5,7 +5,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from loco_drake.evaluation.tracking import (
-    Rollout,
     base_errors,
     effort_metrics,
     joint_rmse,
@@ -16,6 +15,7 @@ from loco_drake.evaluation.tracking import (
     tracking_metrics,
 )
 from loco_drake.models.robots import get_robot
+from tests.rollouts import straight_ahead
 
 STEPS = 250  # 5 s: two windows of 2 s and half of a third
 TIME = 0.02 * np.arange(STEPS + 1)
@@ -23,21 +23,7 @@ TIME = 0.02 * np.arange(STEPS + 1)
 
 @pytest.fixture
 def perfect():
-    """Straight ahead at .7 m/s, all as planned."""
-    plan = np.zeros((STEPS + 1, 37))
-    plan[:, 0] = 1.0
-    plan[:, 4] = 0.7 * TIME
-    plan[:, 6] = 0.3
-    plan[:, 22] = 0.7
-    return Rollout(
-        state=plan.copy(),
-        plan_state=plan,
-        path_time=TIME.copy(),
-        desired_joints=plan[:, 7:19].copy(),
-        reward=np.ones(STEPS + 1),
-        steps=STEPS,
-        fell=False,
-    )
+    return straight_ahead(STEPS)
 
 
 def turned(rollout, axis, angle):

@@ -113,6 +113,7 @@ def of_results(results: Results) -> dict[str, Any]:
         if figures.numbers("learning", "steps")
     }
     steering = results.of_robots("steering")
+    disturbed = results.of_robots("robustness")
     return {
         "goals": goals,
         "counts": counts(goals),
@@ -131,6 +132,7 @@ def of_results(results: Results) -> dict[str, Any]:
             for robot, figures in steering.items()
             if figures.part("labels").values
         },
+        "curves": pictures.curves_picture(disturbed) if disturbed else None,
         "returns": pictures.returns_picture(tracking) if tracking else None,
         "learning": pictures.learning_picture(learning) if learning else None,
     }

@@ -20,6 +20,7 @@ from loco_drake.evaluation.generation_pictures import (
 from loco_drake.evaluation.report.content import CONTENT
 from loco_drake.evaluation.report.results import Figures
 from loco_drake.evaluation.report.tables import robot_title
+from loco_drake.evaluation.robustness_pictures import curves_figure
 from loco_drake.evaluation.steering_grid import draw_grid, grid_errors
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS, SOURCES
@@ -198,6 +199,15 @@ def grid_picture(figures: Figures) -> tuple[Figure, str]:
     return figure, (
         f"How far velocity and yaw rate are off the command at each point of the grid, "
         f"for {len(errors)} gaits; the tables have the errors of all points together."
+    )
+
+
+@_as_svg
+def curves_picture(robots: Mapping[str, Figures]) -> tuple[Figure, str]:
+    """Returns how often disturbed robots succeed, against the size of each kind."""
+    return curves_figure(robots, ink=INK), (
+        f"Success of {' and '.join(robots)} against the size of each kind of "
+        "disturbance; the tables have the means."
     )
 
 

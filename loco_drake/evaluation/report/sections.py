@@ -51,6 +51,7 @@ def all_tables(results: Results) -> dict[str, Any]:
         "steering": by_robot("steering", steering_table),
         "steering_range": by_robot("steering", steering_range_table),
         "robustness": robustness_table(results),
+        "disturbed": by_robot("robustness", disturbed_table),
         "policies": policies_table(results),
     }
 
@@ -82,6 +83,11 @@ def steering_range_table(robot: str, figures: Figures) -> Table:
     """Returns the ranges of the commands, by label, and how sound the plan is there."""
     title = f"{robot_title(robot)}, ranges of the commands"
     return label_table(title, _COLUMNS["steering_range"], figures)
+
+
+def disturbed_table(robot: str, figures: Figures) -> Table:
+    """Returns what a robot survives, by label."""
+    return label_table(_by_gait(robot), _COLUMNS["robustness"], figures)
 
 
 def tokenizer_table(robot: str, figures: Figures) -> Table:
