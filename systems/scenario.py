@@ -1,7 +1,9 @@
 """The scenario: a typed description of a simulation, which YAML can express."""
 
+import copyreg
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
@@ -177,6 +179,19 @@ class Scenario:
             )
         period = self.visualization.publish_period
         check_number("The visualization's publish_period", period, 1e-3, 10.0)
+
+
+def _pickled(config: SimulatorConfig | VisualizationConfig) -> tuple[Any, ...]:
+    return _unpickled, (type(config), yaml_dump_typed(config))
+
+
+def _unpickled(schema: type, text: str) -> Any:
+    return yaml_load_typed(schema=schema, data=text)
+
+
+# Drake 1.51 cannot pickle these two, and worker processes are sent scenarios.
+copyreg.pickle(SimulatorConfig, _pickled)
+copyreg.pickle(VisualizationConfig, _pickled)
 
 
 def LoadScenario(

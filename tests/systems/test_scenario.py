@@ -1,8 +1,10 @@
 """Scenarios come from people: typed data is read, anything else is one sentence."""
 
 import contextlib
+import pickle
 import random
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,12 +13,14 @@ from loco_drake.common.errors import InputError
 from loco_drake.control.domain import Domain, Push, SensorErrors
 from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.scenario import (
+    Disturbances,
     ExternalAction,
     GeneratedReference,
     LoadScenario,
     PlanReference,
     Scenario,
     SmootherConfig,
+    TrainedPolicy,
 )
 from loco_drake.systems.simulator import MakeSimulator, StartEpisode
 
@@ -40,6 +44,21 @@ def test_a_scenario_is_read_from_yaml(tmp_path):
     path = tmp_path / "scenario.yaml"
     path.write_text(text)
     assert LoadScenario(filename=path).robot == "a1"
+
+
+@pytest.mark.parametrize("policy", [TrainedPolicy(weights=Path("a/b.x")), None])
+def test_a_scenario_reaches_a_worker_process_as_it_is(policy):
+    """Pickled, which Drake's own configurations cannot be."""
+    scenario = Scenario(
+        robot="a1",
+        reference=GeneratedReference(gait="dog-pace", temperature=0.1 + 0.2),
+        policy=policy or ExternalAction(),
+        disturbances=Disturbances(pushes=True, terrain=True),
+        smoother=None,
+    )
+    for each in (scenario, replace(scenario, reference=PlanReference()), Scenario()):
+        copy = pickle.loads(pickle.dumps(each))
+        assert repr(copy) == repr(each)
 
 
 BAD = {
