@@ -20,6 +20,7 @@ _COMMANDS = {
     "drive": "drive a robot with keys, sliders or a gamepad",
     "generate": "generate motion and write Motion files",
     "retarget": "retarget recordings to a robot",
+    "record": "record what a robot does with motion, to learn from",
     "data list": "list the sources of motion and their licences",
     "data fetch": "download and check the recordings",
     "data inspect": "plot one stretch of a recording",

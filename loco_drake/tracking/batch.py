@@ -55,6 +55,11 @@ class TrackingBatch:
         self._state = np.zeros((count, 37))
         self._action = np.zeros((count, 12))
 
+    @property
+    def states(self) -> Array:
+        """The robots' states [q, v], a copy of shape (B, 37)."""
+        return self._state.copy()
+
     def reset(
         self,
         i: int,

@@ -1,0 +1,122 @@
+"""The command ``record``."""
+
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from loco_drake.cli import output
+from loco_drake.cli.options import Json, Policy, option
+from loco_drake.common.errors import (
+    InputError,
+    check_at_least,
+    check_bounds,
+    check_choice,
+)
+
+if TYPE_CHECKING:
+    from loco_drake.control.actor import Actor
+    from loco_drake.models.robots import Robot
+    from loco_drake.motion.motion import Motion
+    from loco_drake.retargeting.inverse_kinematics import LegSolver
+
+
+@dataclass(kw_only=True)
+class Record:
+    """Let a policy track Motion files in simulation and write what the robot did.
+
+    What is written obeys physics, so it is easier to track, and better to learn from,
+    than the motion that it was made of. Motions that the policy loses or tracks badly
+    are left out.
+    """
+
+    # Folder of Motion files to track.
+    references: Annotated[Path, option(metavar="PATH")]
+    # Robot: go2 or a1.
+    robot: str = "go2"
+    policy: Policy = None
+    # Folder for the Motion files, which are named like their references.
+    out: Path = Path("motions/recorded")
+    # Number of attempts at each motion, of which the best is written.
+    attempts: int = 4
+    # Normalized return of 100 below which a motion is left out.
+    least_return: float = 75.0
+    # Move the trunk afterwards as `retarget --ground` does: the planned contacts are
+    # kept, which a robot in simulation only nearly follows.
+    ground: bool = True
+    json: Json = None
+    # Seed of the attempts.
+    seed: int = 0
+
+    def run(self) -> int:
+        """Writes the files and prints the table; returns 0, or 1 if there are none."""
+        from loco_drake.common.determinism import single_thread
+        from loco_drake.control.actor import load_actor
+        from loco_drake.models.robots import ROBOTS, get_robot
+        from loco_drake.models.shipped import policy_path
+        from loco_drake.motion.motion import FPS
+        from loco_drake.motion.motion_file import load_motion
+        from loco_drake.retargeting.inverse_kinematics import LegSolver
+
+        check_choice("robot", self.robot, ROBOTS)
+        check_at_least("attempts", self.attempts, 1)
+        check_at_least("seed", self.seed, 0)
+        check_bounds("--least-return", self.least_return, 0, 100)
+        paths = sorted(self.references.glob("*.npz"))
+        if not paths:
+            raise InputError(
+                f"There are no Motion files (*.npz) in {str(self.references)!r}."
+            )
+        robot = get_robot(self.robot)
+        actor = load_actor(policy_path(robot, self.policy), robot)
+        solver = LegSolver(robot, FPS)
+        figures = {}
+        with single_thread():
+            for path in output.tracked(paths, "Recording", len(paths)):
+                motion = load_motion(path)
+                figures[path.stem] = self._one(path, motion, robot, actor, solver)
+        written = {k: f for k, f in figures.items() if f["written"]}
+        output.write_json(self.json, figures)
+        rows = [
+            [k, f"{f['normalized_return']:.1f}", f"{f['momentum_error']:.3f}"]
+            for k, f in written.items()
+        ]
+        title = f"Motion files in {self.out}: {len(rows)} of {len(paths)}"
+        output.print_table(title, ["motion", "return", "momentum error"], rows)
+        return 0 if rows else 1
+
+    def _one(
+        self,
+        path: Path,
+        motion: "Motion",
+        robot: "Robot",
+        actor: "Actor",
+        solver: "LegSolver",
+    ) -> dict[str, Any]:
+        """Records one motion; returns its figures."""
+        from loco_drake.motion.momentum import momentum_error
+        from loco_drake.motion.motion_file import save_motion
+        from loco_drake.retargeting.grounding import ground, grounding_report
+        from loco_drake.tracking.recording import record
+
+        done = record(
+            robot,
+            actor,
+            motion,
+            attempts=self.attempts,
+            seed=self.seed,
+            solver=solver,
+        )
+        score = None if done is None else done.normalized_return
+        if done is None or done.normalized_return < self.least_return:
+            return {"written": False, "normalized_return": score}
+        made = done.motion
+        told: dict[str, Any] = {"momentum_error": momentum_error(made, robot)}
+        kept = {"recorded": f"return {score:.1f} of 100"}
+        if self.ground:
+            grounded = ground(made, robot, solver).motion
+            told = asdict(grounding_report(made, grounded, robot))
+            kept |= {k: f"{x:.6g}" for k, x in told.items() if x is not None}
+            made = grounded
+        made = replace(made, provenance={**made.provenance, **kept})
+        save_motion(made, self.out / path.name)
+        return {"written": True, "normalized_return": score, **told}
