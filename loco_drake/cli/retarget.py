@@ -55,8 +55,8 @@ class Retarget:
     # Move the trunk, by some mm and degrees, so that the feet's forces can explain its
     # motion: in flight it falls, on the ground friction suffices. For go2 and a1.
     ground: bool = False
-    # Folder for the Motion files. Default: motions/ROBOT, with the suffixes -mirrored,
-    # -froude and -grounded for these options.
+    # Folder for the Motion files. Default: motions/ROBOT, with the suffixes -mirrored
+    # and -froude and -grounded for these options.
     out: Path | None = None
     # Number of 2 s trajectories for each of the fifteen labels, at most; 0 for none.
     # None are cut with FILE.
