@@ -127,7 +127,7 @@ def robustness(robot="go2"):
         "curves": {**curves, "friction": curve(0.8, 0.5, 0.3)},
     }
     labels = {label: figures for label in LABELS}
-    return {"robot": robot, "labels": labels, "all": figures}
+    return {"robot": robot, "seeds": 3, "labels": labels, "all": figures}
 
 
 def learning(robot="go2"):

@@ -26,7 +26,7 @@ class EvaluateRobustness(SimulatedEvaluation):
     kinds: tuple[str, ...] = ()
     # Number of plans per label, each tracked under every disturbance; seeds count up
     # from --seed.
-    seeds: int = 1
+    seeds: int = 2
     # Seed of the first plan of each label.
     seed: int = 0
     policy: Policy = None

@@ -62,20 +62,26 @@ def curves_figure(robots: Mapping[str, Figures], *, ink: str = "k") -> Figure:
 def _draw(axes: Axes, name: str, curves: Figures, robot: str, place: int) -> None:
     kind = KINDS[name]
     ways = [f"{name}_{way}" for way in kind.ways if way] or [name]
-    for color, way in zip(_COLORS, ways, strict=False):
+    width = kind.factor * abs(kind.levels[-1] - kind.nominal)
+    for k, way in enumerate(ways):
+        color = _COLORS[k if len(ways) > 1 else place]
+        aside = 0.012 * width * (k + place - (len(ways) - 1) / 2)  # of the bars
         part = curves.part(way)
         levels, shares, counts = (
             np.array(part.numbers(key), float)
             for key in ("levels", "success", "episodes")
         )
+        sound = len(levels) == len(shares) == len(counts) and counts.min() > 0
+        if not (sound and shares.min() >= 0 and shares.max() <= 1):
+            raise curves.damaged(f"{way} is no curve")
         low, high = np.transpose(
             [wilson(s, n) for s, n in zip(shares, counts, strict=True)]
         )
         axes.errorbar(
-            kind.factor * levels,
+            kind.factor * levels + aside,
             100 * shares,
             100 * np.abs([shares - low, high - shares]),
-            color=color if len(ways) > 1 else _COLORS[place],
+            color=color,
             ls=("-", "--")[place % 2],
             marker="o",
             ms=4,
@@ -84,8 +90,9 @@ def _draw(axes: Axes, name: str, curves: Figures, robot: str, place: int) -> Non
             label=" ".join(filter(None, (robot, way.partition("_")[2]))),
         )
     unit = f", {kind.unit}" if kind.unit else ""
-    axes.set(xlabel=f"{kind.title}{unit}", ylabel="success, %", ylim=(-3, 104))
-    axes.label_outer(remove_inner_ticks=False)
+    axes.set(xlabel=f"{kind.title}{unit}", ylim=(-3, 104))
+    if (grid_cell := axes.get_subplotspec()) and grid_cell.is_first_col():
+        axes.set_ylabel("success, %")
     if kind.levels[-1] < kind.nominal:
         axes.set_xlim(*sorted(axes.get_xlim(), reverse=True))
     axes.legend(fontsize=7, loc="lower left")

@@ -124,7 +124,7 @@ def test_disturbances_show_what_is_survived(made):
     part = section(page, "disturbances")
     assert row(part, "dog-trot")[1:7] == ["12.3", "9.9", "15.6", "0.46", "100", "50"]
     assert "Success of go2 against the size of each kind" in part
-    assert "loco-drake evaluate robustness --robot go2" in part
+    assert "loco-drake evaluate robustness --robot go2 --seeds 3" in part
 
 
 def test_pictures_say_what_they_show(made):

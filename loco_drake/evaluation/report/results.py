@@ -294,13 +294,18 @@ _OPTIONS = (
 def commands(results: Results) -> dict[str, str]:
     """Returns the command that makes each expected file, by path.
 
-    Of results of tracking that are there, the options are those of their conditions.
+    Of results of tracking that are there, the options are those of their conditions; of
+    those of robustness, the number of seeds.
     """
     return {file.path: _command(file, results) for file in EXPECTED}
 
 
 def _command(file: ResultFile, results: Results) -> str:
     found = results.found.get(file.path, {})
+    if file.name == "robustness" and found:
+        (figures,) = found.values()
+        seeds = figures.number("seeds")
+        return file.command if seeds is None else f"{file.command} --seeds {seeds:.0f}"
     if not file.name.startswith("tracking-") or not found:
         return file.command
     (figures,) = found.values()

@@ -11,7 +11,7 @@ from loco_drake.common.files import TIMES, figures_sha256
 from loco_drake.evaluation.report import pictures
 from loco_drake.evaluation.report.page import of_results
 from loco_drake.evaluation.report.results import load_results, results_dir
-from tests.report_results import learning, steering, tokenizer, tracking
+from tests.report_results import learning, robustness, steering, tokenizer, tracking
 
 SHIPPED = sorted(path.name for path in results_dir().glob("*.json"))
 # What the hash leaves out, in bytes: a number or a list of numbers, or the hash.
@@ -61,7 +61,7 @@ def quick_pictures(monkeypatch):
 @pytest.mark.parametrize("name", SHIPPED)
 def test_any_value_that_is_wrong(name, tmp_path, monkeypatch):
     """Of what tables and goals are made of: each of 12 values, by each wrong one."""
-    for picture in ("confusion", "returns", "learning", "grid"):
+    for picture in ("confusion", "returns", "learning", "grid", "curves"):
         monkeypatch.setattr(pictures, f"{picture}_picture", lambda *_: "")
     content = json.loads((results_dir() / name).read_text())
     random = np.random.default_rng(0)
@@ -132,6 +132,32 @@ def test_damage_of_steering_is_refused(path, wrong, tmp_path):
     assert not refused(tmp_path, "steering-go2.json", content)
 
 
+@pytest.mark.parametrize(
+    ("path", "wrong"),
+    [
+        (("labels", "dog-trot", "recovery_s"), "x"),
+        (("all", "impulse_80_percent_interval_ns"), 3),
+        (("all", "curves"), [1]),
+        (("all", "curves", "push_left"), None),
+        (("all", "curves", "friction", "levels"), [0.8, "x", 0.3]),
+        (("all", "curves", "friction", "success"), [1.0, 0.5]),
+        (("all", "curves", "friction", "success"), [1.0, 0.5, 7.0]),
+        (("all", "curves", "friction", "success"), [1.0, None, 0.0]),
+        (("all", "curves", "friction", "episodes"), [2, 4, 0]),
+        (("all", "curves", "friction", "episodes"), []),
+        (("seeds",), "x"),
+    ],
+)
+def test_damage_of_robustness_is_refused(path, wrong, tmp_path):
+    content = robustness()
+    assert not refused(tmp_path, "robustness-go2.json", content)
+    parent = content
+    for key in path[:-1]:
+        parent = parent[key]
+    parent[path[-1]] = wrong
+    assert refused(tmp_path, "robustness-go2.json", content)
+
+
 def steering_at(path):
     value = steering()
     for key in path:
@@ -181,7 +207,7 @@ def test_labels_of_results_need_not_be_those_of_the_package(tmp_path):
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_flipped_digit_is_noticed(name, tmp_path, monkeypatch):
     """One digit of each of ten figures, but for times, becomes another."""
-    for picture in ("confusion", "returns", "learning", "grid"):
+    for picture in ("confusion", "returns", "learning", "grid", "curves"):
         monkeypatch.setattr(pictures, f"{picture}_picture", lambda *_: "")
     written = (results_dir() / name).read_bytes()
     assert said_of(tmp_path, name, written) is None
