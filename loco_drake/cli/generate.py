@@ -40,6 +40,9 @@ class Generate:
     # Steer each motion by commands drawn every 2 s: along another path, sideways,
     # faster, slower and backwards, see docs/driving.md.
     steer: bool = False
+    # Move the trunk until the feet's forces explain its motion, as `retarget --ground`
+    # does; some ms a frame.
+    ground: bool = False
     # Sampling temperature: above 1 more varied, below 1 more typical, 0 greedy.
     temperature: float = 1.0
     # Sample from the likeliest codes that together have this probability.
@@ -55,6 +58,8 @@ class Generate:
         from loco_drake.generation.motion_model import load_motion_model
         from loco_drake.models.robots import ROBOTS
         from loco_drake.models.shipped import pretrained_path
+        from loco_drake.retargeting.grounding import ground
+        from loco_drake.retargeting.inverse_kinematics import LegSolver
 
         schedule = parse_schedule(self.gait)
         generate.check_duration(self.duration)
@@ -70,6 +75,7 @@ class Generate:
             self.generator or pretrained_path("generator"),
             self.robot,
         )
+        solver = LegSolver(model.robot, FPS) if self.ground else None
         seconds, frames = 0.0, 0
         for first in range(self.seed, self.seed + self.count, BATCH):
             seeds = range(first, min(first + BATCH, self.seed + self.count))
@@ -88,6 +94,8 @@ class Generate:
             for seed, motion in zip(seeds, motions, strict=True):
                 if self.steer:
                     motion = steered_motion(model.robot, motion, seed)
+                if self.ground:
+                    motion = ground(motion, model.robot, solver).motion
                 save_motion(motion, self.out / f"{schedule}-{seed}.npz")
                 frames += len(motion)
         figures = {

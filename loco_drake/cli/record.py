@@ -95,7 +95,7 @@ class Record:
         """Records one motion; returns its figures."""
         from loco_drake.motion.momentum import momentum_error
         from loco_drake.motion.motion_file import save_motion
-        from loco_drake.retargeting.grounding import ground, grounding_report
+        from loco_drake.retargeting.grounding import ground
         from loco_drake.tracking.recording import record
 
         done = record(
@@ -109,14 +109,12 @@ class Record:
         score = None if done is None else done.normalized_return
         if done is None or done.normalized_return < self.least_return:
             return {"written": False, "normalized_return": score}
-        made = done.motion
-        told: dict[str, Any] = {"momentum_error": momentum_error(made, robot)}
         kept = {"recorded": f"return {score:.1f} of 100"}
+        made = replace(done.motion, provenance={**done.motion.provenance, **kept})
         if self.ground:
-            grounded = ground(made, robot, solver).motion
-            told = asdict(grounding_report(made, grounded, robot))
-            kept |= {k: f"{x:.6g}" for k, x in told.items() if x is not None}
-            made = grounded
-        made = replace(made, provenance={**made.provenance, **kept})
+            made, report, _ = ground(made, robot, solver)
+            told = asdict(report)
+        else:
+            told = {"momentum_error": momentum_error(made, robot)}
         save_motion(made, self.out / path.name)
         return {"written": True, "normalized_return": score, **told}

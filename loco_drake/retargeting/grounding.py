@@ -54,13 +54,6 @@ _CLOSE_ENOUGH = 1e-3  # m and rad, of a step
 _STEP = 1e-6  # m and rad, of differences
 
 
-class Grounded(NamedTuple):
-    """The result of :func:`ground`."""
-
-    motion: Motion
-    solved: Bools  # frames for which inverse kinematics found a solution, (T,)
-
-
 @dataclass(frozen=True)
 class GroundingReport:
     """What physics a grounded motion obeys, and how far it was moved for that."""
@@ -75,6 +68,14 @@ class GroundingReport:
     joint_correction_rmse_rad: float  # over frames and joints
     base_shift_rmse_m: float
     base_turn_rmse_rad: float
+
+
+class Grounded(NamedTuple):
+    """The result of :func:`ground`."""
+
+    motion: Motion  # its provenance has the figures of the report
+    report: GroundingReport
+    solved: Bools  # frames for which inverse kinematics found a solution, (T,)
 
 
 def ground(
@@ -113,7 +114,14 @@ def ground(
         provenance=motion.provenance,
         fps=motion.fps,
     )
-    return Grounded(replace(grounded, gait_changes=motion.gait_changes), solved)
+    report = grounding_report(motion, grounded, robot)
+    told = {k: f"{x:.6g}" for k, x in vars(report).items() if x is not None}
+    grounded = replace(
+        grounded,
+        gait_changes=motion.gait_changes,
+        provenance={**motion.provenance, **told},
+    )
+    return Grounded(grounded, report, solved)
 
 
 def grounding_report(before: Motion, after: Motion, robot: Robot) -> GroundingReport:

@@ -31,11 +31,7 @@ from loco_drake.retargeting.contacts import (
     track_width,
 )
 from loco_drake.retargeting.correction import correct
-from loco_drake.retargeting.grounding import (
-    GroundingReport,
-    ground,
-    grounding_report,
-)
+from loco_drake.retargeting.grounding import GroundingReport, ground
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.scaling import (
     AS_RECORDED,
@@ -134,9 +130,7 @@ def retarget_clip(
     )
     grounding = None
     if variant.ground:
-        before = motion
-        motion, solved = ground(before, get_robot(robot.name), solver)
-        grounding = grounding_report(before, motion, get_robot(robot.name))
+        motion, grounding, solved = ground(motion, get_robot(robot.name), solver)
     seconds = time.perf_counter() - began
     p_WF = quality.toe_trajectories(motion, robot)
     standing = None if config.stance_height is not None else on_feet(clip)
@@ -169,9 +163,7 @@ def retarget_clip(
     )
     report = replace(report, warnings=outside_bounds(asdict(report), robot))
     kept = ("scale", "toe_error_rmse_m", "correction_rmse_m")
-    told = {name: getattr(report, name) for name in kept}
-    told |= vars(grounding) if grounding else {}
-    figures = {k: f"{x:.6g}" for k, x in told.items() if x is not None}
+    figures = {name: f"{getattr(report, name):.6g}" for name in kept}
     if report.warnings:
         figures["warnings"] = "; ".join(report.warnings)
     return replace(motion, provenance={**motion.provenance, **figures}), report

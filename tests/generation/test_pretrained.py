@@ -19,6 +19,7 @@ from loco_drake.generation.motion_model import MotionModel, pretrained_motion_mo
 from loco_drake.models.robots import ROBOTS, get_robot
 from loco_drake.models.shipped import pretrained_path
 from loco_drake.motion.gaits import parse_label, parse_schedule
+from loco_drake.motion.momentum import momentum_error
 from loco_drake.motion.motion_file import load_motion
 from loco_drake.motion.quality import (
     joint_speed_ratio_max,
@@ -318,6 +319,21 @@ def test_the_command_changes_the_gait_on_the_way(tmp_path):
     assert len(motion) == 101
     assert str(motion.label) == "several-gaits"
     assert motion.provenance["generated"] == f"{gait} for 2 s"
+
+
+def test_grounded_motion_of_several_gaits(tmp_path):
+    gait = "dog-pace,dog-trot@1"
+    for name, ground in (("plain", False), ("grounded", True)):
+        out = tmp_path / name
+        assert Generate(gait=gait, duration=2.0, out=out, ground=ground).run() == 0
+    plain, grounded = (
+        load_motion(tmp_path / name / f"{gait}-0.npz") for name in ("plain", "grounded")
+    )
+    robot = get_robot("go2")
+    assert momentum_error(grounded, robot) < 0.3 * momentum_error(plain, robot)
+    assert (plain.grounded, grounded.grounded) == (False, True)
+    assert grounded.gait_changes == plain.gait_changes
+    np.testing.assert_array_equal(grounded.contacts, plain.contacts)
 
 
 @pytest.mark.parametrize(

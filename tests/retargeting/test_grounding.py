@@ -67,7 +67,7 @@ def test_flight_becomes_the_parabola_of_its_duration(robot, hopped):
     From take-off to landing, 9 steps of 20 ms, the parabola rises g (.18 s)^2 / 8 = 40
     mm over its ends, of which the made motion has fewer than half.
     """
-    made, (motion, solved) = hopped
+    made, (motion, _, solved) = hopped
     assert solved.all()
     assert free_fall_error(made, robot) > 5
     assert free_fall_error(motion, robot) < 0.4
@@ -87,8 +87,11 @@ def test_flight_becomes_the_parabola_of_its_duration(robot, hopped):
 
 def test_price_is_told_and_small(robot, hopped):
     """The trunk moves by less than the parabola rises; joints stay within limits."""
-    made, (motion, _) = hopped
-    report = grounding_report(made, motion, robot)
+    made, (motion, report, _) = hopped
+    assert report == grounding_report(made, motion, robot)
+    assert float(motion.provenance["momentum_error"]) == pytest.approx(
+        report.momentum_error, rel=1e-5
+    )
     assert 0.003 < report.base_shift_rmse_m < 0.025
     assert 0.003 < report.ground_correction_rmse_m < 0.025
     assert 0.005 < report.joint_correction_rmse_rad < 0.1
@@ -102,7 +105,7 @@ def test_price_is_told_and_small(robot, hopped):
 
 def test_motion_that_obeys_physics_is_left_alone(robot, solver, hopped):
     """What was grounded once moves by a third of that, at most, when grounded again."""
-    made, (motion, _) = hopped
+    made, (motion, _, _) = hopped
     again = ground(motion, robot, solver).motion
     first, second = (
         quality.distance_rmse(a.base_position, b.base_position)
@@ -121,9 +124,8 @@ def test_flight_too_long_for_its_legs_is_a_compromise_within_limits(robot, solve
     contacts = made.contacts.copy()
     contacts[15:65] = False
     long = replace(made, contacts=contacts)
-    motion, solved = ground(long, robot, solver)
+    motion, report, solved = ground(long, robot, solver)
     assert solved.all()
-    report = grounding_report(long, motion, robot)
     assert 1 < report.free_fall_error_mps2 < report.free_fall_error_before_mps2
     assert quality.joint_limit_violations(motion.joint_positions, robot) == 0
     p_WF = quality.toe_trajectories(motion, robot)
@@ -135,7 +137,7 @@ def test_shortest_motions_with_and_without_contact(robot, solver, frames):
     made = hops(robot, 0.02)
     for start in (0, FLIGHT + 2):  # in the air, on the ground
         short = made.slice(start, start + frames)
-        motion, _ = ground(short, robot, solver)
+        motion = ground(short, robot, solver).motion
         assert len(motion) == frames
         assert momentum_error(motion, robot) <= momentum_error(short, robot) + 1e-3
 
