@@ -139,6 +139,9 @@ class PpoConfig:
     log_std: float = -0.7
     # That of networks to start from. Default: theirs.
     restart_log_std: float | None = None
+    # Environment steps at the beginning in which only the critic learns, so that it
+    # knows new motion before it judges the actor.
+    critic_first: int = 0
     # Whether the standard deviation is learned, rather than held.
     learn_std: bool = True
     # Weight of the entropy of the actions in the loss.
@@ -165,6 +168,7 @@ class PpoConfig:
             check_bounds(option, getattr(self, name), 0, 1, above=True)
         check_bounds("--target-kl", self.target_kl, 0, above=True)
         check_bounds("--entropy", self.entropy, 0)
+        check_at_least("critic_first", self.critic_first, 0)
         for name in ("log_std", "restart_log_std"):
             value = getattr(self, name)
             if value is not None and not np.isfinite(value):

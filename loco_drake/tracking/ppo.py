@@ -88,6 +88,7 @@ class AdaptivePPO(PPO):
 
     target: float
     rate: float
+    critic_first: int  # environment steps in which only the critic learns
 
     def split_optimizer(self, critic_rate: float) -> None:
         """Creates separate parameter groups for actor and critic."""
@@ -101,6 +102,8 @@ class AdaptivePPO(PPO):
     def train(self) -> None:
         """Performs one update and adapts the learning rate."""
         super().train()
+        if self._holds_actor:
+            return
         kl = float(self.logger.name_to_value["train/approx_kl"])
         if kl > 2 * self.target:
             self.rate = max(self.rate / 1.5, 1e-5)
@@ -115,8 +118,13 @@ class AdaptivePPO(PPO):
         return cast(RunningMeanStd, normalizer.obs_rms)
 
     def _update_learning_rate(self, optimizers: Any) -> None:
-        self.logger.record("train/learning_rate", self.rate)
-        optimizers.param_groups[0]["lr"] = self.rate
+        rate = 0.0 if self._holds_actor else self.rate
+        self.logger.record("train/learning_rate", rate)
+        optimizers.param_groups[0]["lr"] = rate
+
+    @property
+    def _holds_actor(self) -> bool:
+        return self.num_timesteps <= self.critic_first
 
 
 def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
@@ -153,6 +161,7 @@ def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
     )
     learner.target = config.target_kl
     learner.rate = config.actor_rate
+    learner.critic_first = config.critic_first
     learner.split_optimizer(config.critic_rate)
     learner.policy.log_std.requires_grad_(config.learn_std)
     return learner

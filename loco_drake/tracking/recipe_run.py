@@ -82,7 +82,7 @@ def run_recipe(
         run = _Run(folder, recipe, workers, report, stop, evaluator)
         if resume:
             run.check_continues(read_recipe(folder / RECIPE))
-        run.begin()
+        run.begin(resume=resume)
         interrupted = not (run.make_references() and run.train())
         if not interrupted:
             last = run.stage_folder(len(recipe.stages) - 1)
@@ -95,6 +95,7 @@ def run_recipe(
 def check_recipe_folder(folder: Path, *, resume: bool) -> None:
     """Raises InputError if a recipe cannot begin, or go on, in ``folder``."""
     found = [x for x in (RECIPE, POLICY, CHECKPOINT) if (folder / x).exists()]
+    found += sorted(path.name for path in folder.glob("[0-9]*-*"))
     if resume and RECIPE not in found:
         raise InputError(
             f"There is no recipe to resume in {str(folder)!r}, which has no {RECIPE}; "
@@ -196,10 +197,10 @@ class _Run:
                 "with --out."
             )
 
-    def begin(self) -> None:
+    def begin(self, *, resume: bool) -> None:
         """Writes the recipe, and what the first stage starts from."""
         start = self.folder / _START
-        if self.recipe.start_from is not None and not start.is_file():
+        if self.recipe.start_from is not None and not (resume and start.is_file()):
             path = training_path(self.recipe.start_from)
             read_beginning(path, self.recipe.training(0).ppo.hidden)
             with atomic_path(start) as temporary:

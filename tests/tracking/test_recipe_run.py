@@ -260,7 +260,7 @@ def test_an_interruption_between_stages_is_heard(recipe, tmp_path):
     assert not (tmp_path / "1-first").exists()
 
 
-def test_nothing_is_done_again_and_nothing_overwritten(recipe, ended):
+def test_nothing_is_done_again_and_nothing_overwritten(recipe, ended, tmp_path):
     folder = ended[0]
     before = contents(folder)
     with pytest.raises(InputError, match=r"holds a run already.*--resume.*--out"):
@@ -273,6 +273,9 @@ def test_nothing_is_done_again_and_nothing_overwritten(recipe, ended):
     with pytest.raises(InputError, match=r"no recipe to resume.*recipe.yaml"):
         run_recipe(folder / "1-first", resume=True)
     assert contents(folder) == before
+    (tmp_path / "1-first").mkdir()
+    with pytest.raises(InputError, match=r"holds a run already \(1-first\)"):
+        run_recipe(tmp_path, recipe)
     run_recipe(folder, recipe, resume=True)
     changed = {path for path, x in contents(folder).items() if x != before.get(path)}
     assert changed <= {folder / "curve.json", folder / POLICY}

@@ -236,6 +236,28 @@ def test_a_training_can_start_with_another_noise_and_hold_it(trained, plans, tmp
             assert differ == {name}
 
 
+def test_the_critic_can_learn_first(trained, plans, tmp_path):
+    """For two batches the actor is as it was; it learns from the third on."""
+    first = trained[0] / "checkpoint.safetensors"
+    before = saved_in(trained[0])
+    for steps, learns in ((128, False), (192, True)):
+        other = config(steps, critic_first=128)
+        train_tracker(
+            plans, other, tmp_path, resume=learns, first=None if learns else first
+        )
+        after = saved_in(tmp_path)
+        moved = {
+            name
+            for name, value in before.tensors.items()
+            if name.startswith("module/")
+            and not torch.equal(value, after.tensors[name])
+        }
+        assert any("value" in name for name in moved)
+        assert any("value" not in name for name in moved) == learns
+        if not learns:
+            assert after.state["learning_rate"] == before.state["learning_rate"]
+
+
 def test_a_reward_for_entropy_keeps_noise_up(plans, tmp_path):
     noise = {}
     for entropy in (0.0, 1.0):
