@@ -42,6 +42,8 @@ class ReferenceSet:
     first_seed: int = 1000
     # Whether each motion is steered, as by `generate --steer`.
     steered: bool = False
+    # Whether each motion is grounded, as by `generate --ground`.
+    grounded: bool = False
     # Folder of Motion files to take instead.
     folder: Path | None = None
 

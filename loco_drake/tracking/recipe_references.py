@@ -13,7 +13,10 @@ from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import Robot
 from loco_drake.models.shipped import pretrained_path
+from loco_drake.motion.motion import FPS
 from loco_drake.motion.motion_file import save_motion
+from loco_drake.retargeting.grounding import ground
+from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.tracking.recipe import ReferenceSet
 from loco_drake.tracking.references import read_motions
 
@@ -51,7 +54,8 @@ def make_references(
     mark, found = folder / MARK, {}
     if mark.is_file():
         found = read_json(mark)
-        if found.get("set") != asked:
+        # Of before a field there was, it has the default.
+        if {**asdict(ReferenceSet()), **found.get("set", {})} != asked:
             raise InputError(
                 f"{str(folder)!r} holds other references than the recipe asks for; "
                 "begin in another folder with --out."
@@ -82,6 +86,7 @@ def _generate(
     stopped: Callable[[], bool],
 ) -> bool:
     model, first = pretrained_motion_model(robot.name), references.first_seed
+    solver = LegSolver(robot, FPS)
     last = first + references.count
     total, done = len(references.gaits) * references.count, 0
     for label in references.gaits:
@@ -95,6 +100,8 @@ def _generate(
                 for seed, path, motion in zip(seeds, paths, motions, strict=True):
                     if references.steered:
                         motion = steered_motion(robot, motion, seed)
+                    if references.grounded:
+                        motion = ground(motion, robot, solver).motion
                     save_motion(motion, path)
             done += len(seeds)
             report(done, total)

@@ -343,6 +343,26 @@ def test_ones_own_motions_are_copied(ended, tmp_path):
         make_references(get_robot("go2"), ReferenceSet(), tmp_path)
 
 
+def test_motions_are_grounded_if_asked_for(tmp_path):
+    """The trunk moves; in a folder of before there was the field it did not."""
+    trunks = []
+    for grounded in (False, True):
+        one = ReferenceSet(labels=["dog-trot"], count=1, seconds=2.0, grounded=grounded)
+        folder = tmp_path / str(grounded)
+        assert make_references(get_robot("go2"), one, folder)
+        trunks.append(load_motion(folder / "dog-trot-1000.npz").base_position)
+    moved = abs(trunks[1] - trunks[0]).max()
+    assert 1e-4 < moved < 0.1
+    mark = tmp_path / "False" / "references.json"
+    text = json.loads(mark.read_text())
+    del text["set"]["grounded"]
+    mark.write_text(json.dumps(text))
+    same = ReferenceSet(labels=["dog-trot"], count=1, seconds=2.0)
+    assert make_references(get_robot("go2"), same, mark.parent)
+    with pytest.raises(InputError, match="holds other references"):
+        make_references(get_robot("go2"), one, mark.parent)
+
+
 def test_motions_of_other_weights_are_not_mixed(tmp_path):
     one = ReferenceSet(labels=["dog-trot", "dog-pace"], count=1, seconds=2.0)
     asked = iter([False, True])
