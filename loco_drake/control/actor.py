@@ -158,11 +158,11 @@ class HistoryActor(Actor):
 
     A second network estimates by how much velocity and height of the base differ from
     the plan's, from the observation without its privileged parts and from the
-    measurements before. Odometry adds up the
-    velocity to where the robot is relative to its plan. The actor's layers, those of a
-    privileged actor, act on the observation that is completed with all three. No
-    estimate and no action depends on the position that the observation was computed
-    with.
+    measurements before, and what the legs say at each of these times
+    (:mod:`.leg_odometry`). Odometry adds up the velocity to where the robot is relative
+    to its plan. The actor's layers, those of a privileged actor, act on the observation
+    that is completed with all three. No estimate and no action depends on the position
+    that the observation was computed with.
     """
 
     def __init__(self, config: ActorConfig) -> None:
