@@ -8,6 +8,7 @@ import pytest
 
 from loco_drake.cli.main import _COMMANDS
 from loco_drake.evaluation.report.results import results_dir
+from loco_drake.evaluation.robustness_pictures import levels_table
 from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
 
@@ -151,3 +152,16 @@ def test_steering_shows_the_committed_results(robot, title):
     results = json.loads((results_dir() / f"steering-{robot}.json").read_text())
     figures = {**results["labels"], "all": results["all"]}
     assert rows == [[name, *steering_row(own)] for name, own in figures.items()]
+
+
+@pytest.mark.parametrize("robot", ["go2", "a1"])
+def test_robustness_shows_the_committed_results(robot):
+    """The rows of all gaits; docs/draw.py prints the tables."""
+    page = (ROOT / "docs" / "robustness.md").read_text()
+    whole = json.loads((results_dir() / f"robustness-{robot}.json").read_text())["all"]
+    low, high = whole["impulse_80_percent_interval_ns"]
+    row = f"| all | {whole['impulse_80_percent_ns']:.1f} | {low:.1f} | {high:.1f} | "
+    assert f"{row}{whole['recovery_s']:.2f} | " in page
+    columns, rows = levels_table(whole)
+    for cells in (columns, *rows):
+        assert f"| {' | '.join(cells)} |" in page
