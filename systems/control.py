@@ -71,20 +71,22 @@ class RobotState(LeafSystem):
         super().__init__()
         self.robot = robot
         size = 13 + 2 * len(robot.joint_names)
-        self._terrain = self.DeclareAbstractParameter(Value[object](None))
+        # A tuple of one or none, since a Value cannot begin with None in all Drakes.
+        self._terrain = self.DeclareAbstractParameter(AbstractValue.Make(()))
         self._state = self.DeclareVectorInputPort("plant_state", size)
         self.DeclareVectorOutputPort("state", size, self._calc)
 
     def SetTerrain(self, context: Context, terrain: Terrain | None) -> None:
         """Sets the terrain, None if level, in ``context``, this system's own."""
-        context.get_mutable_abstract_parameter(self._terrain).set_value(terrain)
+        held = () if terrain is None else (terrain,)
+        context.get_mutable_abstract_parameter(self._terrain).set_value(held)
 
     def GetTerrain(self, context: Context) -> Terrain | None:
         """Returns the terrain in ``context``, this system's own."""
-        terrain: Terrain | None = context.get_abstract_parameter(
+        held: tuple[Terrain, ...] = context.get_abstract_parameter(
             self._terrain
         ).get_value()
-        return terrain
+        return held[0] if held else None
 
     def _calc(self, context: Context, output: Any) -> None:
         state = unit_base(self._state.Eval(context))
