@@ -95,7 +95,8 @@ def _draw(axes: Axes, name: str, curves: Figures, robot: str, place: int) -> Non
         axes.set_ylabel("success, %")
     if kind.levels[-1] < kind.nominal:
         axes.set_xlim(*sorted(axes.get_xlim(), reverse=True))
-    axes.legend(fontsize=7, loc="lower left")
+    # Long enough to show dashes.
+    axes.legend(fontsize=7, loc="lower left", handlelength=3.5)
 
 
 def _title(name: str) -> str:
