@@ -45,7 +45,7 @@ SCRIPTS = {
         "class Pipe:\n"
         "    def recv(self): print(*show())\n"
         "workers.TrackingBatch = lambda plans, config, count: None\n"
-        "workers._work(Pipe(), [], None, [])",
+        "workers._work(Pipe(), [], None, [], False)",
         1,
     ),
 }
