@@ -108,11 +108,8 @@ def open_run(
         saved = read_checkpoint(folder / CHECKPOINT, name) if resume else None
         if saved is not None:
             check_same(saved, run, settings(options), steps)
-        # Left by a training that was killed; safetensors writes to a file of its own
-        # first.
-        for pattern in (".*.safetensors", ".tmp??????"):
-            for unfinished in folder.glob(pattern):
-                unfinished.unlink()
+        for unfinished in folder.glob(".*.safetensors"):
+            unfinished.unlink()  # left by a training that was killed
         header = {"run": dict(run), "options": dict(options)}
         yield RunFolder(folder / CHECKPOINT, f"{name} checkpoint", header, saved)
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors import safe_open
+from safetensors.torch import save
 from torch import Tensor
 
 from loco_drake.common.errors import InputError, quoted
@@ -55,11 +55,10 @@ def save_weights(
         json.dumps({"format_version": FORMAT_VERSION, "kind": kind, "config": config})
     )
     header["content_sha256"] = _content_sha256(header, stored)
+    # Its save_file writes to a temporary file of its own, which a kill would leave.
+    content = save(stored, metadata={"loco_drake": json.dumps(header)})
     with atomic_path(Path(path)) as temporary:
-        try:
-            save_file(stored, temporary, metadata={"loco_drake": json.dumps(header)})
-        except SafetensorError as error:  # a full disk
-            raise OSError(f"{path} could not be written: {error}") from None
+        temporary.write_bytes(content)
 
 
 def load_weights(

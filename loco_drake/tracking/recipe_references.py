@@ -86,7 +86,7 @@ def _generate(
     stopped: Callable[[], bool],
 ) -> bool:
     model, first = pretrained_motion_model(robot.name), references.first_seed
-    solver = LegSolver(robot, FPS)
+    solver = LegSolver(robot, FPS) if references.grounded else None
     last = first + references.count
     total, done = len(references.gaits) * references.count, 0
     for label in references.gaits:

@@ -100,7 +100,6 @@ def test_a_killed_training_goes_on_from_its_last_checkpoint(train, tmp_path):
     assert steps % BATCH == 0
     # What a training that is killed while it saves leaves behind.
     (out / ".checkpoint.x1y2.safetensors").write_bytes(b"half")
-    (out / ".tmpF0edHn").write_bytes(b"half")
     resume = ("--workers=1", "--resume", f"--steps={steps + 2 * BATCH}")
     second = train(out, *resume, f"--json={figures}")
     _, error = second.communicate(timeout=LIMIT)
