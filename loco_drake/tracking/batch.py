@@ -50,7 +50,7 @@ class TrackingBatch:
         self.plan = np.zeros(count, dtype=np.int64)  # index of each robot's plan
         self.start = np.zeros(count, dtype=np.int64)  # sample that it started at
         self.sample = np.zeros(count, dtype=np.int64)  # sample that it is at
-        self.penalty = np.zeros(count)  # of its last step, for distance and falls
+        self.penalty = np.zeros(count)  # of its last step, for distance, falls and actions
         self._last = np.zeros(count, dtype=np.int64)
         self._state = np.zeros((count, 37))
         self._action = np.zeros((count, 12))
@@ -111,6 +111,8 @@ class TrackingBatch:
         fallen = has_fallen(self._robot, split(self._state)[0])
         self.penalty = self._config.position_penalty * np.linalg.norm(gap, axis=1)
         self.penalty += self._config.fall_cost * fallen
+        effort = np.square(self._action).mean(axis=1)
+        self.penalty += self._config.action_penalty * effort
         lost = fallen | self._config.termination.exceeded(self._state, wanted)
         return terms, lost, ~lost & (self.sample >= self._last)
 

@@ -76,6 +76,9 @@ class EnvironmentConfig:
     # Training cost of a fall in perfect steps, beyond the steps that it loses. Reported
     # returns do not include it.
     fall_cost: float = 0.0
+    # Training penalty per step on the mean square of the actions. What they need not
+    # correct is then left to the feed-forward. Reported returns do not include it.
+    action_penalty: float = 0.0
     # Share of the episodes that start where episodes have failed, in proportion to
     # failure rates by the second of a plan; the others start anywhere.
     failure_weight: float = 0.0
@@ -93,6 +96,7 @@ class EnvironmentConfig:
             check_bounds(f"--reset-noise.{name}", value, 0)
         check_bounds("--position-penalty", self.position_penalty, 0)
         check_bounds("--fall-cost", self.fall_cost, 0)
+        check_bounds("--action-penalty", self.action_penalty, 0)
         check_bounds("--failure-weight", self.failure_weight, 0, 1)
         self.randomization.check(robot, self.plant)
 
