@@ -129,6 +129,17 @@ def test_the_position_penalty_takes_its_share_for_each_metre_beside_the_plan(pla
         assert less < reward
 
 
+def test_the_action_penalty_takes_its_share_of_the_mean_square(plans):
+    """Of twelve actions, two are 2 and the others 0: the mean square is 8 / 12."""
+    env = TrackingEnv(plans, EnvironmentConfig(action_penalty=0.3))
+    env.reset(seed=0, options={"plan": 0, "sample": 10})
+    action = np.zeros(12, dtype=np.float32)
+    action[[1, 7]] = 2.0
+    _, reward, *_, info = env.step(action)
+    terms = sum(info[name] for name in REWARD_TERMS)
+    assert terms - reward == pytest.approx(0.3 * 8 / 12)
+
+
 def test_a_fall_costs_what_it_is_to_cost(plans):
     env = TrackingEnv(plans, EnvironmentConfig(fall_cost=4.0, termination=ANYWHERE))
     env.reset(seed=0, options={"plan": 0, "sample": 10})
