@@ -50,7 +50,8 @@ class TrackingBatch:
         self.plan = np.zeros(count, dtype=np.int64)  # index of each robot's plan
         self.start = np.zeros(count, dtype=np.int64)  # sample that it started at
         self.sample = np.zeros(count, dtype=np.int64)  # sample that it is at
-        self.penalty = np.zeros(count)  # of its last step, for distance, falls and actions
+        # Of its last step, for distance, falls and actions.
+        self.penalty = np.zeros(count)
         self._last = np.zeros(count, dtype=np.int64)
         self._state = np.zeros((count, 37))
         self._action = np.zeros((count, 12))
