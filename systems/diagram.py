@@ -22,6 +22,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.control.actor import load_actor
 from loco_drake.control.gait_choice import best_gait
 from loco_drake.control.plan import plan_from_motion
+from loco_drake.control.retiming import fall_limit
 from loco_drake.models.plant import AddRobotPlant
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.models.shipped import policy_path
@@ -225,7 +226,8 @@ def AddPlan(
 
     Returns their input and output ports by name, see :func:`MakeLocomotionDiagram`.
     """
-    reference = _Add(builder, "reference", _MakeReference(robot, scenario))
+    made, grounded = _MakeReference(robot, scenario)
+    reference = _Add(builder, "reference", made)
     inputs, outputs, chain = {}, {}, [reference]
     if reference.HasInputPort("gait"):
         inputs["gait"] = reference.GetInputPort("gait")
@@ -245,7 +247,10 @@ def AddPlan(
             builder.Connect(selector.GetOutputPort("gait"), inputs["gait"])
             inputs["gait"] = selector.GetInputPort("gait")
     if scenario.smoother is not None:
-        smoother = ToppraSmoother(robot, scenario.smoother)
+        config = scenario.smoother
+        if config.fall is None:
+            config = replace(config, fall=fall_limit(grounded))
+        smoother = ToppraSmoother(robot, config)
         _Add(builder, "smoother", smoother, plan=chain[-1].GetOutputPort("plan"))
         ports = ("path_time", "fixed_time", "clock_rate")
         for system, name in product(chain, ports):
@@ -256,7 +261,8 @@ def AddPlan(
     return inputs, outputs
 
 
-def _MakeReference(robot: Robot, scenario: Scenario) -> LeafSystem:
+def _MakeReference(robot: Robot, scenario: Scenario) -> tuple[LeafSystem, bool]:
+    """Returns the reference, and whether its motion is grounded."""
     reference = scenario.reference
     if isinstance(reference, GeneratedReference):
         # Imports torch models, which a player does not need.
@@ -265,10 +271,12 @@ def _MakeReference(robot: Robot, scenario: Scenario) -> LeafSystem:
         if reference.gait == ANY:
             gait = best_gait(measured_gaits(robot), np.zeros(3))
             reference = replace(reference, gait=gait_name(gait))
-        return ReferenceGenerator(robot, reference)
+        generator = ReferenceGenerator(robot, reference)
+        return generator, generator.grounded
     if isinstance(reference, MotionReference):
-        return PlanPlayer(robot, plan_from_motion(robot, load_motion(reference.path)))
-    return PlanPlayer(robot)
+        motion = load_motion(reference.path)
+        return PlanPlayer(robot, plan_from_motion(robot, motion)), motion.grounded
+    return PlanPlayer(robot), False
 
 
 def _AddControl(

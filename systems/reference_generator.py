@@ -106,6 +106,8 @@ class ReferenceGenerator(PlanProducer):
         self._horizon = horizon
         self._config.check()
         self._model = model or pretrained_motion_model(robot.name)
+        # Whether the model learned from grounded motion only.
+        self.grounded = self._model.grounded
         self._gait = self.DeclareVectorInputPort("gait", 1)
         self._path_time = self.DeclareVectorInputPort("path_time", 1)
         self._fixed_time = self.DeclareVectorInputPort("fixed_time", 1)

@@ -71,8 +71,9 @@ class SmootherConfig:
     chunk: float = 0.96
     # Seconds of smoothed plan ahead of the clock.
     lookahead: float = 1.0
-    # Largest downward acceleration of the base, g; grounded motion needs 2.
-    fall: float = 1.0
+    # Largest downward acceleration of the base, g. Default: 2 for grounded motion and a
+    # generator that learned from such, else 1.
+    fall: float | None = None
 
     def check(self) -> None:
         """Raises InputError unless every field is valid."""
@@ -81,7 +82,8 @@ class SmootherConfig:
         check_number("The smoother's chunk", self.chunk, UPDATE_PERIOD, 1.4)
         # The policy looks .16 s ahead.
         check_number("The smoother's lookahead", self.lookahead, 0.16, 10.0)
-        check_number("The smoother's fall", self.fall, 0.1, 10.0)
+        if self.fall is not None:
+            check_number("The smoother's fall", self.fall, 0.1, 10.0)
 
 
 @dataclass(kw_only=True)

@@ -10,6 +10,7 @@ from loco_drake.control.retiming import (
     PathLimits,
     Progress,
     no_progress,
+    fall_limit,
     path_limits,
     smooth_chunk,
 )
@@ -57,7 +58,9 @@ class ToppraSmoother(PlanProducer):
         self._robot = robot
         self._config = config or SmootherConfig()
         self._config.check()
-        self._limits = limits or path_limits(robot, self._config.fall)
+        self._limits = limits or path_limits(
+            robot, self._config.fall or fall_limit(grounded=False)
+        )
         rest = standing_plan(robot)
         self._plan_in = self.DeclareAbstractInputPort("plan", Value(rest))
         self._DeclarePlan(no_progress(robot, 0.0))

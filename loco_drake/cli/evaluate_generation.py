@@ -68,6 +68,7 @@ class EvaluateGeneration(Effort, Evaluation):
         if self.motions is not None:
             motions = load_to_score(self.motions, robot, self.labels)
             generated = model_figures.cut_for_scoring(motions)
+            motions_grounded = all(motion.grounded for motion in motions)
             if beyond := {str(m.label) for m in motions if m.label not in LABELS}:
                 say(
                     f"Motions of {', '.join(sorted(beyond))} are left out of all "
@@ -76,10 +77,11 @@ class EvaluateGeneration(Effort, Evaluation):
         else:
             model = load_motion_model(paths["tokenizer"], paths["generator"], name)
             known = model_figures.known_labels(model, labels)
-        recorded = self.retarget(robot)
+        ground = motions_grounded if model is None else model.grounded
+        recorded = self.retarget(robot, ground)
         if model is not None:
             others = [n for n in model.tokenizer.config.robots if n != name]
-            other = self.retarget(get_robot(others[0])) if others else None
+            other = self.retarget(get_robot(others[0]), ground) if others else None
             say(f"Generating {', '.join(map(str, known))}")
             generated = model_figures.generate_for_scoring(
                 model, known, self, self.seed

@@ -155,7 +155,7 @@ class EvaluateSteering(SimulatedEvaluation):
                 )
         model = pretrained_motion_model(name)
         model.check_told()
-        recorded = self.retarget(get_robot(name))
+        recorded = self.retarget(get_robot(name), model.grounded)
         stretches = by_label(cut((*recorded.train, *recorded.validation)))
         ways = compare_ways(scenario, courses, self.workers)
         labels = {}

@@ -45,6 +45,7 @@ class EvaluateTokenizer(Evaluation):
         """Returns the figures of one robot."""
         from loco_drake.evaluation.generation_pictures import code_use_figure
         from loco_drake.evaluation.tokenizer import evaluate_tokenizer
+        from loco_drake.generation.training_motions import read_training_record
         from loco_drake.models.robots import get_robot
 
         robots = self._tokenizer.config.robots
@@ -53,7 +54,9 @@ class EvaluateTokenizer(Evaluation):
                 f"The tokenizer's weights are not for the robot {name!r}; they are "
                 f"for {', '.join(robots)}."
             )
-        recorded = self.retarget(get_robot(name))
+        record = read_training_record(self._path, "tokenizer") or {}
+        grounded = bool(record.get("grounded", False))
+        recorded = self.retarget(get_robot(name), grounded)
         seen = trained_on({"tokenizer": self._path}, recorded, name)
         figures, counts = evaluate_tokenizer(self._tokenizer, recorded, self.books)
         if self.figures is not None:

@@ -25,7 +25,8 @@ class EvaluateTracking(SimulatedEvaluation):
     # Gait labels, such as dog-trot dog-pace. Default: those that the policy was trained
     # on.
     labels: tuple[str, ...] = ()
-    # generated, during the simulation, or retargeted, from stretches of the recordings.
+    # generated, during the simulation; retargeted, from stretches of the recordings; or
+    # grounded, from these made to obey physics.
     reference: str = "generated"
     # Number of episodes per label, at most; seeds count up from --seed.
     seeds: int = 20
@@ -65,7 +66,7 @@ class EvaluateTracking(SimulatedEvaluation):
         from loco_drake.generation.generate import check_duration
 
         super().check()
-        check_choice("reference", self.reference, ("generated", "retargeted"))
+        check_choice("reference", self.reference, ("generated", "retargeted", "grounded"))
         check_choice("simulator", self.simulator, ("drake", "mujoco"))
         check_duration(self.duration)
         if self.pushes:
@@ -110,6 +111,7 @@ class EvaluateTracking(SimulatedEvaluation):
     def prepare(self, name: str) -> "tuple[Scenario, list[Trial]]":
         """Returns what to simulate for a robot."""
         from loco_drake.control.actor import load_actor
+        from loco_drake.control.retiming import fall_limit
         from loco_drake.datasets.registry import data_dir
         from loco_drake.datasets.segments import read_segments
         from loco_drake.evaluation import tracking_table
@@ -121,18 +123,20 @@ class EvaluateTracking(SimulatedEvaluation):
         robot = get_robot(name)
         weights = policy_path(robot, self.policy)
         trained = load_actor(weights, robot).config.labels
-        parse = any_label if self.reference == "retargeted" else parse_label
+        parse = parse_label if self.reference == "generated" else any_label
         labels = [str(parse(label)) for label in self.labels or trained]
         plant = self._plant()
         plant.check()
         plant_damping(robot, plant)
         policy = systems.TrainedPolicy(weights=weights)
         scenario = systems.Scenario(robot=name, plant=plant, policy=policy)
-        if self.reference == "retargeted":
+        if self.reference != "generated":
+            ground = self.reference == "grounded"
             scenario.reference = systems.PlanReference()
+            scenario.smoother = systems.SmootherConfig(fall=fall_limit(ground))
             segments = read_segments(data_dir(self.data_dir))
             return scenario, tracking_table.retargeted_trials(
-                segments, labels, self.seeds, self.duration
+                segments, labels, self.seeds, self.duration, ground
             )
         scenario.reference = systems.GeneratedReference(
             gait=labels[0], duration=self.duration

@@ -85,14 +85,20 @@ class Evaluation:
         """Prints figures of a robot; returns the exit status."""
         raise NotImplementedError
 
-    def retarget(self, robot: "Robot") -> "Recorded":
-        """Returns the recordings as motion of a robot; says which failed."""
+    def retarget(self, robot: "Robot", ground: bool = False) -> "Recorded":
+        """Returns the recordings as motion of a robot; says which failed.
+
+        The motion is made to obey physics if ``ground``.
+        """
         from loco_drake.datasets.registry import data_dir
         from loco_drake.evaluation.recorded import retarget_recordings
 
         folder = data_dir(self.data_dir)
-        say_of(robot.name)("Retargeting the recordings")
-        recorded = retarget_recordings(folder, robot, self.labels, self.workers)
+        grounding = " and grounding" if ground else ""
+        say_of(robot.name)(f"Retargeting{grounding} the recordings")
+        recorded = retarget_recordings(
+            folder, robot, self.labels, self.workers, ground=ground
+        )
         print_failed(recorded.failed.items())
         return recorded
 

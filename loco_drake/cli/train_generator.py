@@ -101,4 +101,5 @@ class TrainGenerator(NetworkTraining):
             codebook_size=tokenizer.config.codebook_size,
             frames_per_token=tokenizer.config.frames_per_token,
             labels=tuple(str(label) for label in library.labels),
+            grounded=library.grounded,
         )

@@ -43,6 +43,11 @@ class PathLimits:
     acceleration: Array  # lower and upper, shape (D, 2)
 
 
+def fall_limit(grounded: bool) -> float:
+    """Returns the ``fall`` of :func:`path_limits` for motion, grounded or not."""
+    return GROUNDED_FALL if grounded else 1.0
+
+
 def path_limits(robot: Robot, fall: float = 1.0) -> PathLimits:
     """Returns the robot's limits on its joints (rad) and the height of its base (m).
 

@@ -15,6 +15,7 @@ from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import FPS, Motion
 from loco_drake.motion.motion_file import load_motion
 from loco_drake.retargeting.retarget import SegmentRetargeter
+from loco_drake.retargeting.scaling import Variant
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,9 +38,16 @@ class Recorded:
 
 
 def retarget_recordings(
-    data_dir: Path, robot: Robot, labels: Iterable[str] = (), workers: int = 1
+    data_dir: Path,
+    robot: Robot,
+    labels: Iterable[str] = (),
+    workers: int = 1,
+    *,
+    ground: bool = False,
 ) -> Recorded:
     """Retargets the recordings of ``labels``, by default of all fifteen.
+
+    Their motion is made to obey physics if ``ground``.
 
     Raises:
         InputError: if ``segments.csv`` in the folder is unsound, or lacks a label.
@@ -47,7 +55,8 @@ def retarget_recordings(
     segments = read_segments(data_dir)
     names = {str(label) for label in LABELS}
     wanted = [s for s in select_labels(segments, labels) if s.label in names]
-    make = partial(SegmentRetargeter, robot, Split(segments))
+    variant = Variant(ground=ground)
+    make = partial(SegmentRetargeter, robot, Split(segments), variant)
     motions, failed = [], {}
     for segment, made in zip(
         wanted, map_in_workers(make, wanted, workers), strict=True

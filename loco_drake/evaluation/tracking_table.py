@@ -42,6 +42,7 @@ from loco_drake.models.plant import plant_damping
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import any_label
 from loco_drake.retargeting.retarget import SegmentRetargeter
+from loco_drake.retargeting.scaling import Variant
 from loco_drake.systems.scenario import PlanReference, Scenario
 from loco_drake.tracking.randomization import RandomizationConfig
 
@@ -64,6 +65,7 @@ class Trial:
     duration: float  # s; of a recorded reference at most its length
     # The recording to follow; None to follow the generator.
     segment: Segment | None = None
+    ground: bool = False  # whether that recording's motion is made to obey physics
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,10 @@ class _Runner:
         else:
             self._damping = self._robot.kd
             self._recorder = MujocoRecorder(scenario, mujoco)
-        self._retarget = SegmentRetargeter(self._robot)
+        self._retargeters = {
+            ground: SegmentRetargeter(self._robot, variant=Variant(ground=ground))
+            for ground in (False, True)
+        }
         # The first step sets up torch.
         self._recorder.start()
         self._recorder.run(PLAN_DT)
@@ -111,7 +116,7 @@ class _Runner:
         if trial.segment is None:
             self._recorder.start(gait=trial.label, seed=trial.seed, **episode)
         else:
-            plan = self._plan(trial.segment)
+            plan = self._plan(trial.segment, trial.ground)
             duration = min(duration, plan.end_time)
             self._recorder.start(plan=plan, **episode)
         rollout, wall = self._recorder.run(duration)
@@ -125,8 +130,8 @@ class _Runner:
             wall=wall,
         )
 
-    def _plan(self, segment: Segment) -> Any:
-        result = self._retarget(segment)
+    def _plan(self, segment: Segment, ground: bool) -> Any:
+        result = self._retargeters[ground](segment)
         if isinstance(result, str):
             raise InputError(f"{segment.name} cannot be retargeted: {result}")
         return plan_from_motion(self._robot, result[1])
@@ -141,9 +146,15 @@ def generated_trials(
 
 
 def retargeted_trials(
-    segments: Sequence[Segment], labels: Iterable[str], count: int, duration: float
+    segments: Sequence[Segment],
+    labels: Iterable[str],
+    count: int,
+    duration: float,
+    ground: bool = False,
 ) -> list[Trial]:
     """Returns up to ``count`` trials of each label, evenly spread over its segments.
+
+    Their motion is grounded if ``ground``.
 
     Raises:
         InputError: if a label has no segment.
@@ -152,7 +163,7 @@ def retargeted_trials(
     for label in labels:
         own = select_labels(segments, [label])
         chosen = np.unique(np.linspace(0, len(own) - 1, count).round().astype(int))
-        trials += [Trial(label, int(k), duration, own[k]) for k in chosen]
+        trials += [Trial(label, int(k), duration, own[k], ground) for k in chosen]
     return trials
 
 

@@ -9,7 +9,7 @@ from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, check_bounds
 from loco_drake.generation.motion_model import MotionModel
 from loco_drake.motion.gaits import ROW_LABELS, GaitLabel, GaitSchedule
-from loco_drake.motion.motion import FPS, Motion
+from loco_drake.motion.motion import FPS, GROUNDED, LEARNED_FROM, Motion
 
 Integers = NDArray[np.int64]
 
@@ -101,6 +101,7 @@ def generate_motions(
                 "pace": f"{stream.speed_rank[i]:.4g}",
                 **({} if told is None else {"told": _text(told[i])}),
                 "tokenizer": model.tokenizer.fingerprint,
+                **({LEARNED_FROM: GROUNDED} if model.grounded else {}),
             },
             gait_changes=gait_changes if label == SEVERAL else (),
         )

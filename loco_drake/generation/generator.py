@@ -46,6 +46,7 @@ class GeneratorConfig:
     heads: int = 4  # attention heads
     dropout: float = 0.1  # probability, while training
     told: bool = False  # whether it can be told velocities
+    grounded: bool = False  # whether all motion that it was trained on was grounded
 
 
 # Keys and values of a layer for the P times so far, each (B, heads, P, size).

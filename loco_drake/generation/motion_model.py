@@ -97,6 +97,8 @@ class MotionModel:
         self._writer = deepcopy(self.generator).double()
         self._decoder = deepcopy(self.tokenizer).double()
         self.robot: Robot = get_robot(robot)
+        # Whether it learned from grounded motion only.
+        self.grounded = generator.config.grounded
         self.frames_per_token = tokenizer.config.frames_per_token
         self.chunk_tokens = round(CHUNK_SECONDS * FPS / self.frames_per_token)
         self.chunk_frames = self.chunk_tokens * self.frames_per_token

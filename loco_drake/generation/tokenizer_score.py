@@ -56,16 +56,25 @@ class Toes:
     def velocities(self, features: Tensor, p_HF: Tensor, robot: Tensor) -> Tensor:
         """Returns velocities of the toes over the ground in m/s, (B, T - 1, 4, 3).
 
-        Uses backward differences in the heading frame of ``p_HF`` from
-        :meth:`positions`; the velocity of a stance foot is zero.
+        See :func:`over_ground`; the velocity of a stance foot is zero.
         """
-        speed = features[:, 1:, ft.VELOCITY] * self.stand_height[robot, None, None]
-        rate = features[:, 1:, ft.YAW_RATE]  # (B, T - 1, 1)
-        middle = (p_HF[:, 1:] + p_HF[:, :-1]) / 2
-        x, y, _ = middle.unbind(-1)  # (B, T - 1, 4)
-        turning = torch.stack((-rate * y, rate * x, torch.zeros_like(x)), dim=-1)
-        moving = torch.cat((speed, torch.zeros_like(speed[..., :1])), dim=-1)
-        return (p_HF[:, 1:] - p_HF[:, :-1]) * FPS + turning + moving[:, :, None]
+        return over_ground(features, p_HF, self.stand_height[robot])
+
+
+def over_ground(features: Tensor, p_H: Tensor, stand_height: Tensor) -> Tensor:
+    """Returns velocities of N points over the ground in m/s, (B, T - 1, N, 3).
+
+    Uses backward differences in the heading frame of the points (B, T, N, 3), which are
+    relative to the point on the ground under the trunk. ``stand_height`` has the shape
+    (B,).
+    """
+    speed = features[:, 1:, ft.VELOCITY] * stand_height[:, None, None]
+    rate = features[:, 1:, ft.YAW_RATE]  # (B, T - 1, 1)
+    middle = (p_H[:, 1:] + p_H[:, :-1]) / 2
+    x, y, _ = middle.unbind(-1)  # (B, T - 1, N)
+    turning = torch.stack((-rate * y, rate * x, torch.zeros_like(x)), dim=-1)
+    moving = torch.cat((speed, torch.zeros_like(speed[..., :1])), dim=-1)
+    return (p_H[:, 1:] - p_H[:, :-1]) * FPS + turning + moving[:, :, None]
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.common.weights import save_network
 from loco_drake.generation.features import CONTACTS
 from loco_drake.generation.loop_settings import LoopSettings
+from loco_drake.generation.point_masses import PointMasses
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig
 from loco_drake.generation.tokenizer_score import Toes
 from loco_drake.generation.training import LoopResult, train
@@ -42,6 +43,9 @@ WEIGHTS = {
     "energy": 0.5,  # squared error of the logarithm of the RMS of that in a window
     "toes": 1.0,  # squared error of toe positions, in units of TOE_SCALE
     "toe_speeds": 0.5,  # ... of their velocities over the ground, TOE_SPEED_SCALE
+    # What forces of the feet do not explain of the error of momentum's rate of change,
+    # MOMENTUM_SCALE.
+    "momentum": 0.25,
     "contacts": 0.2,  # cross-entropy
     "commitment": 0.25,
 }
@@ -50,6 +54,7 @@ LEAST_SCALES = (0.02, 0.005, 0.002)  # of deviation, change, jitter: rad, stand 
 QUIET = 0.2  # share of a label's jitter that is taken for none
 TOE_SCALE = 0.05  # m
 TOE_SPEED_SCALE = 0.5  # m/s
+MOMENTUM_SCALE = 0.1  # of the weight, see PointMasses.unexplained
 
 
 class Scales:
@@ -148,13 +153,15 @@ def train_tokenizer(
         learning.tokenizer.decoder_out.weight.mul_(0.01)
     frames = np.concatenate([clip.features for clip in clips])
     learning.tokenizer.set_statistics(torch.tensor(frames, dtype=torch.float32))
-    toes = Toes(config.robots)
+    toes, masses = Toes(config.robots), PointMasses(config.robots)
     windows = PairedWindows(clips, config.robots)
     scales = Scales(clips)
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         target, robot, label = windows(random, BATCH)
-        losses = tokenizer_losses(learning, toes, scales(label), target, robot)
+        losses = tokenizer_losses(
+            learning, toes, masses, scales(label), target, robot
+        )
         weighted = (WEIGHTS[name] * loss for name, loss in losses.items())
         total = sum(weighted, torch.zeros(()))
         return total, {name: loss.item() for name, loss in losses.items()}
@@ -174,6 +181,7 @@ def train_tokenizer(
 def tokenizer_losses(
     learning: LearningTokenizer,
     toes: Toes,
+    masses: PointMasses,
     scales: tuple[Tensor, Tensor, Tensor],
     target: Tensor,
     robot: Tensor,
@@ -183,6 +191,7 @@ def tokenizer_losses(
     Args:
         learning: in training mode its codebooks are updated.
         toes: of the tokenizer's robots.
+        masses: of the tokenizer's robots.
         scales: of the windows, see :class:`Scales`.
         target: features, shape (N, T, SIZE). The first BATCH windows are encoded, and
             all are to be decoded from their tokens, see :class:`PairedWindows`.
@@ -196,6 +205,9 @@ def tokenizer_losses(
     p_output = toes.positions(output, robot)
     v_target = toes.velocities(target, p_target, robot)
     v_output = toes.velocities(output, p_output, robot)
+    # Half of the windows are enough, at half the time.
+    half = (x[::2] for x in (output, target, p_target, robot))
+    missing = masses.unexplained(*half)
     return {
         "features": (error / deviation).square().mean(),
         "changes": (error.diff(dim=1) / change).square().mean(),
@@ -203,6 +215,7 @@ def tokenizer_losses(
         "energy": energy_error(output, target, jitter),
         "toes": ((p_output - p_target) / TOE_SCALE).square().mean(),
         "toe_speeds": ((v_output - v_target) / TOE_SPEED_SCALE).square().mean(),
+        "momentum": missing.mean() / MOMENTUM_SCALE**2,
         "contacts": functional.binary_cross_entropy_with_logits(
             contacts, target[..., CONTACTS]
         ),

@@ -34,6 +34,7 @@ class Clip:
     features: Array  # see features.py, (T, SIZE)
     # File, frames and mirroring: the same for all robots; empty if unknown.
     performance: str = ""
+    grounded: bool = False  # whether it was made to obey physics
 
     def __len__(self) -> int:
         return len(self.features)
@@ -51,6 +52,11 @@ class Library:
         """The labels in ``train``, in the order of gaits.LABELS."""
         present = {clip.label for clip in self.train}
         return tuple(label for label in LABELS if label in present)
+
+    @property
+    def grounded(self) -> bool:
+        """Whether all motion in ``train`` was made to obey physics."""
+        return all(clip.grounded for clip in self.train)
 
     @property
     def robots(self) -> tuple[str, ...]:
@@ -121,6 +127,7 @@ def motion_clip(motion: Motion, path: str = "") -> Clip:
         recording=recording_name(motion, path),
         features=motion_features(get_robot(motion.robot), motion),
         performance=performance,
+        grounded=motion.grounded,
     )
 
 
@@ -150,13 +157,14 @@ def training_record(library: Library, settings: LoopSettings) -> dict[str, Any]:
 
     ``recordings`` are the seconds that were learned from of each subject (a recording,
     or an animal with all of its own) and robot, mirror images not counted; ``held_out``
-    are the subjects that were not.
+    are the subjects that were not; ``grounded`` is as in Library.
     """
     seconds: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
     for clip in library.train[: len(library.train) // 2]:  # then come mirror images
         seconds[clip.recording][clip.robot] += len(clip) / FPS
     return {
         "robots": list(library.robots),
+        "grounded": library.grounded,
         "recordings": {
             name: {robot: round(s, 2) for robot, s in sorted(of_robot.items())}
             for name, of_robot in sorted(seconds.items())

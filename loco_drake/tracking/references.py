@@ -5,7 +5,7 @@ from pathlib import Path
 
 from loco_drake.common.errors import InputError
 from loco_drake.control.plan import Plan, plan_from_motion
-from loco_drake.control.retiming import GROUNDED_FALL, path_limits, smooth_plan
+from loco_drake.control.retiming import fall_limit, path_limits, smooth_plan
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import Robot
@@ -16,10 +16,7 @@ from loco_drake.motion.motion_file import load_motion
 
 def smooth_motions(robot: Robot, motions: Iterable[Motion]) -> list[Plan]:
     """Returns motions as plans, re-timed by the smoother."""
-    limits = {
-        grounded: path_limits(robot, GROUNDED_FALL if grounded else 1.0)
-        for grounded in (False, True)
-    }
+    limits = {grounded: path_limits(robot, fall_limit(grounded)) for grounded in (False, True)}
     return [
         smooth_plan(robot, plan_from_motion(robot, motion), limits[motion.grounded])
         for motion in motions
