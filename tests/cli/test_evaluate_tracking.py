@@ -53,7 +53,7 @@ def test_json_says_what_the_worlds_were_drawn_from(tmp_path, capsys):
         ("--pushes --push-interval 0", "push_interval must be two numbers"),
         ("--randomization.latency 0 1", "latency must be two numbers"),
         ("--robot spot", "choices are go2, a1, all"),
-        ("--reference dog", "choices are generated, retargeted"),
+        ("--reference dog", "choices are generated, retargeted, grounded"),
         ("--labels dog-hop", "Unknown gait 'dog-hop'"),
         ("--seeds 0", "--seeds must be 1 or more"),
         ("--duration nan", "duration must be above 0"),
@@ -83,7 +83,14 @@ def test_recordings_of_any_label_can_be_followed(made_data, tmp_path, capsys):
     )
     line = ["evaluate", "tracking", *options.split(), "--labels"]
     assert main([*line, "dog-turn_left"]) == 0
-    assert list(json.loads(path.read_text())["labels"]) == ["dog-turn_left"]
+    figures = json.loads(path.read_text())
+    assert list(figures["labels"]) == ["dog-turn_left"]
+    grounded = [x.replace("retargeted", "grounded") for x in line]
+    assert main([*grounded, "dog-turn_left"]) == 0
+    moved = json.loads(path.read_text())
+    assert moved["reference"] == "grounded"
+    # The motion is another one.
+    assert moved["all"] != figures["all"]
     assert main([*line, "dog-hop"]) == 2
     assert "'dog-hop'; the choices are dog-pace" in capsys.readouterr().err
 

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 
 from loco_drake.cli.evaluation import trained_on
@@ -5,12 +7,15 @@ from loco_drake.cli.train_generator import TrainGenerator
 from loco_drake.cli.train_tokenizer import TrainTokenizer
 from loco_drake.common.weights import save_network
 from loco_drake.evaluation.recorded import by_split
+from loco_drake.generation.generate import generate_motions
+from loco_drake.generation.motion_model import load_motion_model
 from loco_drake.generation.tokenizer import load_tokenizer
 from loco_drake.generation.training_motions import (
     read_training_record,
     seen_in_training,
 )
-from loco_drake.motion.motion_file import load_motion
+from loco_drake.motion.gaits import parse_label
+from loco_drake.motion.motion_file import load_motion, save_motion
 from tests.synthetic_motion import synthetic_motion
 
 # Those for training of the folder `motions`: two stretches of 3 s, 151 frames, each.
@@ -35,11 +40,31 @@ def test_weights_say_what_they_were_trained_on(weights):
     assert record["recordings"] == TRAINED
     assert record["held_out"] == ["dog-dog-pace1", "dog-dog-trot1"]
     assert (record["steps"], record["seed"]) == (2, 5)
+    assert record["grounded"] is False
     assert record["learning_rate"] == 2e-3
     assert not {"out", "resume"} & set(record)
     record = read_training_record(weights["generator"], "generator")
     assert record["recordings"] == TRAINED
     assert (record["steps"], record["stitched"]) == (1, 1)
+
+
+def test_a_generator_of_grounded_motion_says_so(weights, motions, tmp_path):
+    """If all motion to train on was made to obey physics, and so does what it writes."""
+    for path in sorted(motions.glob("*.npz")):
+        motion = load_motion(path)
+        provenance = {**motion.provenance, "momentum_error": "0.01"}
+        save_motion(replace(motion, provenance=provenance), tmp_path / path.name)
+    out = tmp_path / "generator"
+    options = {"out": out, "tokenizer": weights["tokenizer"], "stitched": 1, "steps": 1}
+    TrainGenerator(motions=(tmp_path,), **options).run()
+    path = out / "generator.safetensors"
+    record = read_training_record(path, "generator")
+    assert record["grounded"] is True
+    for generator, grounded in ((path, True), (weights["generator"], False)):
+        model = load_motion_model(weights["tokenizer"], generator, "go2")
+        assert model.grounded is grounded
+        (motion,) = generate_motions(model, parse_label("dog-trot"), 0.1, [0])
+        assert motion.grounded is grounded
 
 
 def test_recordings_seen_in_training_are_named(weights, motions):
