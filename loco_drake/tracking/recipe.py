@@ -1,7 +1,7 @@
 """Recipes: everything that a robot's policy is trained by, in one YAML file."""
 
 from copy import deepcopy
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +106,26 @@ class Common:
 
 
 @dataclass(kw_only=True)
+class Before:
+    """The first stages of another recipe, such as that of another robot."""
+
+    # A shipped recipe or a YAML file.
+    recipe: Path
+    # How many of its stages.
+    stages: int = 1
+
+    def read(self) -> "Recipe":
+        """Returns the recipe without its later stages.
+
+        Raises:
+            InputError: if there is none, it is unsound, or has no such stage.
+        """
+        recipe = read_recipe(self.recipe)
+        check_bounds("The stages of the recipe before", self.stages, 1, len(recipe.stages))
+        return replace(recipe, stages=recipe.stages[: self.stages])
+
+
+@dataclass(kw_only=True)
 class Recipe:
     """What a robot's policy is trained by, from nothing to its weights."""
 
@@ -118,6 +138,8 @@ class Recipe:
     # Networks of the first stage: null for new ones, a shipped policy such as go2, or
     # the policy.safetensors or checkpoint.safetensors of a run; of any robot.
     start_from: Path | None = None
+    # Stages to do first, whose networks the first stage begins with; null for none.
+    before: Before | None = None
     # What to train on, by name.
     references: dict[str, ReferenceSet] = field(default_factory=dict)
     common: Common = field(default_factory=Common)
@@ -132,6 +154,10 @@ class Recipe:
         check_bounds("The recipe's environments", self.environments, 1)
         if not (self.stages and self.references):
             raise InputError("A recipe needs references and stages.")
+        if self.before is not None:
+            if self.start_from is not None:
+                raise InputError("A recipe has either start_from or before.")
+            self.before.read()
         if EVALUATION in self.references:
             raise InputError(f"No references can be called {EVALUATION!r}.")
         if self.evaluation is not None:
@@ -213,6 +239,8 @@ def write_recipe(recipe: Recipe, path: Path) -> None:
     """Writes a recipe with all its fields, for :func:`read_recipe`."""
     values = asdict(recipe)
     parts = [values, *values["references"].values()]
+    if recipe.before is not None:
+        parts.append(values["before"])
     if recipe.evaluation is not None:
         parts.append(values["evaluation"]["motions"])
     for part in parts:

@@ -3,7 +3,7 @@
 import shutil
 import signal
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -31,6 +31,7 @@ from loco_drake.tracking.references import load_references
 from loco_drake.tracking.train import POLICY, train_tracker
 
 RECIPE, CURVE, REFERENCES = "recipe.yaml", "curve.json", "references"
+BEFORE = "before"  # folder of the stages of another recipe
 # What a stage ended with; written when nothing is left to do in its folder.
 FIGURES = "figures.json"
 _START = "start.safetensors"
@@ -83,7 +84,9 @@ def run_recipe(
         if resume:
             run.check_continues(read_recipe(folder / RECIPE))
         run.begin(resume=resume)
-        interrupted = not (run.make_references() and run.train())
+        interrupted = not (
+            run.do_before() and run.make_references() and run.train()
+        )
         if not interrupted:
             last = run.stage_folder(len(recipe.stages) - 1)
             halve_policy(last / POLICY, folder / POLICY)
@@ -117,8 +120,9 @@ def recipe_curve(folder: Path, recipe: Recipe) -> dict[str, Any]:
     """Returns the learning curve of all stages, one after the other.
 
     Returns:
-        "steps" and "seconds" of all stages so far, "stages" with the name of each that
-        has begun and the steps at which it did, and "curve" with "steps", "seconds" and
+        "steps" and "seconds" of all stages so far, those of a recipe before this one
+        included; "stages" with the name of each that has begun and the steps at which
+        it did; and "curve" with "steps", "seconds" and
         "return": the mean over its labels of the normalized return (0-100) of recent
         training episodes, see :func:`.learning_curve`. "evaluation" has the points of
         :class:`.Evaluator`, and "steps_to_90" the steps of its first return of 90, or
@@ -127,6 +131,9 @@ def recipe_curve(folder: Path, recipe: Recipe) -> dict[str, Any]:
     stages: list[dict[str, Any]] = []
     curve: dict[str, list[Any]] = {"steps": [], "seconds": [], "return": []}
     steps, seconds = 0, 0.0
+    if recipe.before is not None:
+        earlier = recipe_curve(folder / BEFORE, recipe.before.read())
+        steps, seconds = earlier["steps"], earlier["seconds"]
     for index, stage in enumerate(recipe.stages):
         own = stage_folder(folder, recipe, index)
         if not own.is_dir():
@@ -145,7 +152,7 @@ def recipe_curve(folder: Path, recipe: Recipe) -> dict[str, Any]:
         ended = own / FIGURES
         done = read_json(ended) if ended.is_file() else {}
         steps += int(done.get("steps", max(log["steps"], default=0)))
-        seconds = max(curve["seconds"], default=0.0)
+        seconds = max(curve["seconds"], default=seconds)
     points = read_points(folder / _POINTS)
     return {
         "steps": steps,
@@ -176,7 +183,7 @@ class _Run:
         old, new = asdict(before), asdict(self.recipe)
         differ = [
             name
-            for name in ("robot", "seed", "environments", "start_from")
+            for name in ("robot", "seed", "environments", "start_from", "before")
             if old[name] != new[name]
         ]
         kept = {x: new["references"].get(x) for x in old["references"]}
@@ -208,6 +215,28 @@ class _Run:
         path = self.folder / RECIPE
         if not path.is_file() or read_recipe(path) != self.recipe:
             write_recipe(self.recipe, path)
+
+    def do_before(self) -> bool:
+        """Does the stages of the recipe before; returns False if it was stopped."""
+        if self.recipe.before is None:
+            return True
+        folder, start = self.folder / BEFORE, self.folder / _START
+        if start.is_file():
+            return True
+        first = self.recipe.before.read()
+        figures = run_recipe(
+            folder,
+            first,
+            resume=(folder / RECIPE).is_file(),
+            workers=self.workers,
+            report=lambda what, *rest: self.report(f"before: {what}", *rest),
+        )
+        if figures["interrupted"]:
+            return False
+        last = stage_folder(folder, first, len(first.stages) - 1)
+        with atomic_path(start) as temporary:
+            shutil.copyfile(last / CHECKPOINT, temporary)
+        return True
 
     def make_references(self) -> bool:
         """Makes all motions; returns False if it was stopped."""
@@ -248,10 +277,10 @@ class _Run:
         if not resume and index > 0:
             # Not its policy, which a kill may have left a batch behind.
             first = self.stage_folder(index - 1) / CHECKPOINT
-        elif not resume and self.recipe.start_from is not None:
+        elif not resume and (self.folder / _START).is_file():
             first = self.folder / _START
 
-        before = sum(self._ended_with(i)["steps"] for i in range(index))
+        before = self._steps_before(index)
 
         def report(steps: int, scores: dict[str, float]) -> None:
             mean = sum(scores.values()) / len(scores)
@@ -274,8 +303,9 @@ class _Run:
         write_json(folder / FIGURES, figures)
         return True
 
-    def _ended_with(self, index: int) -> dict[str, Any]:
-        return read_json(self.stage_folder(index) / FIGURES)
+    def _steps_before(self, index: int) -> int:
+        folder, own = self.folder, replace(self.recipe, stages=self.recipe.stages[:index])
+        return int(recipe_curve(folder, own)["steps"])
 
 
 def _of_stage(recipe: Recipe, index: int) -> tuple[Any, ...]:

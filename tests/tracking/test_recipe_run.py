@@ -18,6 +18,7 @@ from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import load_motion
 from loco_drake.tracking.exact_return import exact_returns
 from loco_drake.tracking.recipe import (
+    Before,
     Evaluation,
     Recipe,
     ReferenceSet,
@@ -376,3 +377,35 @@ def test_motions_of_other_weights_are_not_mixed(tmp_path):
     mark.write_text(json.dumps(text))
     with pytest.raises(InputError, match="begun with other weights"):
         make_references(get_robot("go2"), one, tmp_path)
+
+
+def test_stages_of_another_recipe_can_be_done_before(recipe, ended, tmp_path):
+    """Interrupted within them, too; they end as they do there, and count."""
+    path = ended[0] / "recipe.yaml"
+    one = replace(recipe, robot="a1", before=Before(recipe=path, stages=1))
+    one.stages = [replace(recipe.stages[0], steps=64)]
+    run = tmp_path / "run"
+
+    def interrupt(what, done, total, note):
+        if (what, done) == ("before: 1 first", 64):
+            signal.raise_signal(signal.SIGINT)
+
+    assert run_recipe(run, one, report=interrupt)["steps"] == 64
+    figures = run_recipe(run, resume=True)
+    assert not figures["interrupted"]
+    assert figures["steps"] == 192 + 64
+    assert figures["stages"] == [{"name": "first", "first_step": 192}]
+    assert [x["steps"] for x in figures["evaluation"]] == [256]
+    assert figures["curve"]["steps"] == sorted(figures["curve"]["steps"])
+    kept, other = (folder / "1-first" for folder in (run / "before", ended[0]))
+    states = [read_checkpoint(x / CHECKPOINT, "tracker").state for x in (kept, other)]
+    assert states[0]["steps"] == states[1]["steps"] == 192
+    assert (run / "start.safetensors").read_bytes() == (kept / CHECKPOINT).read_bytes()
+    count = read_checkpoint(run / "1-first" / CHECKPOINT, "tracker").state
+    assert count["normalizer_count"] > states[0]["normalizer_count"]
+    assert load_actor(run / POLICY, get_robot("a1"))
+    assert read_recipe(run / "recipe.yaml") == one
+    with pytest.raises(InputError, match="at most 2, not 3"):
+        replace(one, before=Before(recipe=path, stages=3)).check()
+    with pytest.raises(InputError, match="either start_from or before"):
+        replace(one, start_from=path).check()
