@@ -34,8 +34,7 @@ from loco_drake.evaluation.dataset_picture import describe, library_figure
 from loco_drake.evaluation.gait_change import change_figure
 from loco_drake.evaluation.gait_choice_picture import choice_figure
 from loco_drake.evaluation.report.results import load_results, results_dir
-from loco_drake.evaluation.report.sections import disturbed_table
-from loco_drake.evaluation.robustness_pictures import curves_figure, levels_table
+from loco_drake.evaluation.robustness_pictures import curves_figure
 from loco_drake.evaluation.steering_pictures import grid_figure, steering_figures
 from loco_drake.evaluation.tracking import Recorder, dress
 from loco_drake.generation.generate import generate_motions
@@ -235,17 +234,9 @@ def steering(
 
 
 def robustness(png: Png) -> None:
-    """What both robots survive; also prints the tables of docs/robustness.md."""
+    """What both robots survive."""
     found = load_results(results_dir()).of_robots("robustness")
     write_figure(curves_figure(found), png, dpi=80)
-    for robot, figures in found.items():
-        table = disturbed_table(robot, figures)
-        rows = [(row.title, *(cell.text for cell in row.cells)) for row in table.rows]
-        whole = levels_table(figures.part("all").values)
-        for columns, lines in (((table.first, *table.columns), rows), whole):
-            for line in (columns, ["---"] * len(columns), *lines):
-                print(f"| {' | '.join(line)} |")
-            print()
 
 
 def gait_choice(png: Png) -> None:

@@ -1,5 +1,6 @@
 """What the documentation says is so."""
 
+import importlib.util
 import json
 import re
 from pathlib import Path
@@ -8,7 +9,6 @@ import pytest
 
 from loco_drake.cli.main import _COMMANDS
 from loco_drake.evaluation.report.results import results_dir
-from loco_drake.evaluation.robustness_pictures import levels_table
 from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.scenario import ExternalAction, PlanReference, Scenario
 
@@ -88,80 +88,29 @@ def readme():
     return (ROOT / "README.md").read_text()
 
 
-# Columns of the tables of docs/tracking.md: key of the figure, factor, digits.
-TRACKING_COLUMNS = (
-    ("normalized_return", 1, 1),
-    ("normalized_return_worst", 1, 1),
-    ("fall_rate", 100, 0),
-    ("joint_rmse_rad", 1, 3),
-    ("base_position_rmse_m", 1, 3),
-    ("base_orientation_rmse_rad", 1, 3),
-    ("stance_slip_median_mps", 1, 3),
-    ("stretch", 1, 3),
-    ("speed_mps", 1, 2),
-    ("cost_of_transport", 1, 2),
-)
+@pytest.mark.parametrize("name", ["tracking.md", "steering.md", "robustness.md"])
+def test_pages_show_the_committed_results(name):
+    page = (ROOT / "docs" / name).read_text()
+    assert tables().with_results(name, page) == page
 
 
-@pytest.mark.parametrize(("robot", "title"), [("a1", "A1:"), ("go2", "Go2:")])
-def test_tracking_shows_the_committed_results(robot, title):
-    page = (ROOT / "docs" / "tracking.md").read_text()
-    (table,) = re.findall(rf"{title}\n\n((?:\|.*\n)+)", page)
-    rows = [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
-    results = json.loads(
-        (results_dir() / f"tracking-{robot}-generated.json").read_text()
-    )
-    figures = {**results["labels"], "all": results["all"]}
-    assert [row[0] for row in rows] == list(figures)
-    for name, *shown in rows:
-        assert shown == [
-            f"{factor * figures[name][key]:.{digits}f}"
-            for key, factor, digits in TRACKING_COLUMNS
-        ], name
+def test_other_results_change_the_pages():
+    """Each number is where its column says; a table with other columns is refused."""
+    path = results_dir() / "tracking-go2-generated.json"
+    results = json.loads(path.read_text())
+    shown = dict(enumerate(tables().tracking_rows(results)[0]))
+    assert shown[0] == next(iter(results["labels"]))
+    results["labels"][shown[0]]["fall_rate"] = 0.123
+    results["labels"][shown[0]]["speed_mps"] = None
+    other = dict(enumerate(tables().tracking_rows(results)[0]))
+    assert dict(other.items() - shown.items()) == {3: "12", 9: "–"}
+    with pytest.raises(ValueError, match="has 2 columns"):
+        tables()._replaced("Go2:\n\n| a | b |\n|---|---|\n| 1 | 2 |\n", "Go2:", [["1"]])
 
 
-# The same of docs/steering.md, behind the ranges and before the steps covered.
-STEERING_COLUMNS = (
-    ("velocity_rmse_mps", 1, 3),
-    ("yaw_rate_rmse_radps", 1, 3),
-    ("fall_rate", 100, 0),
-    ("normalized_return", 1, 1),
-    ("latency_reference_s", 1, 2),
-    ("latency_robot_s", 1, 2),
-)
-
-
-def steering_row(figures):
-    ranges, covered = ["–"] * 3, "–"  # of all labels together
-    if "range" in figures:
-        ends = figures["range"].values()
-        ranges = [f"{low:.2f} to {high:.2f}" for low, high in ends]
-        covered = f"{figures['steps_covered']} of {figures['steps']}"
-    values = [
-        "–" if figures[key] is None else f"{factor * figures[key]:.{digits}f}"
-        for key, factor, digits in STEERING_COLUMNS
-    ]
-    return [*ranges, *values, covered]
-
-
-@pytest.mark.parametrize(("robot", "title"), [("a1", "A1:"), ("go2", "Go2:")])
-def test_steering_shows_the_committed_results(robot, title):
-    page = (ROOT / "docs" / "steering.md").read_text()
-    (table,) = re.findall(rf"{title}\n\n((?:\|.*\n)+)", page)
-    rows = [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
-    results = json.loads((results_dir() / f"steering-{robot}.json").read_text())
-    figures = {**results["labels"], "all": results["all"]}
-    assert rows == [[name, *steering_row(own)] for name, own in figures.items()]
-
-
-@pytest.mark.parametrize("robot", ["go2", "a1"])
-def test_robustness_shows_the_committed_results(robot):
-    """The rows of all gaits; docs/draw.py prints the tables."""
-    page = (ROOT / "docs" / "robustness.md").read_text()
-    whole = json.loads((results_dir() / f"robustness-{robot}.json").read_text())["all"]
-    low, high = whole["impulse_80_percent_interval_ns"]
-    row = f"| all | {whole['impulse_80_percent_ns']:.1f} | {low:.1f} | {high:.1f} | "
-    assert f"{row}{whole['recovery_s']:.2f} | " in page
-    columns, rows = levels_table(whole)
-    for cells in (columns, *rows):
-        assert f"| {' | '.join(cells)} |" in page
+def tables():
+    """The module docs/tables.py."""
+    spec = importlib.util.spec_from_file_location("tables", ROOT / "docs" / "tables.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

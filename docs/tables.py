@@ -1,0 +1,132 @@
+"""Puts the committed results into the tables of the documentation.
+
+    python docs/tables.py
+
+A table is found by the line before it. ``tests/test_docs.py`` checks that the pages show
+the results.
+"""
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from loco_drake.common.files import atomic_path, read_json
+from loco_drake.evaluation.report.results import Figures, results_dir
+from loco_drake.evaluation.report.sections import disturbed_table
+from loco_drake.evaluation.robustness_pictures import levels_table
+from loco_drake.models.robots import ROBOTS
+
+DOCS = Path(__file__).parent
+TITLES = {"go2": "Go2", "a1": "A1"}
+MISSING = "–"
+
+Rows = list[list[str]]
+# Key of the figure, factor, digits.
+Columns = tuple[tuple[str, float, int], ...]
+
+TRACKING: Columns = (
+    ("normalized_return", 1, 1),
+    ("normalized_return_worst", 1, 1),
+    ("fall_rate", 100, 0),
+    ("joint_rmse_rad", 1, 3),
+    ("base_position_rmse_m", 1, 3),
+    ("base_orientation_rmse_rad", 1, 3),
+    ("stance_slip_median_mps", 1, 3),
+    ("stretch", 1, 3),
+    ("speed_mps", 1, 2),
+    ("cost_of_transport", 1, 2),
+)
+STEERING: Columns = (
+    ("velocity_rmse_mps", 1, 3),
+    ("yaw_rate_rmse_radps", 1, 3),
+    ("fall_rate", 100, 0),
+    ("normalized_return", 1, 1),
+    ("latency_reference_s", 1, 2),
+    ("latency_robot_s", 1, 2),
+)
+
+
+def tracking_rows(results: dict[str, Any]) -> Rows:
+    """Returns the rows of a table of docs/tracking.md."""
+    return [[name, *_cells(own, TRACKING)] for name, own in _by_label(results)]
+
+
+def steering_rows(results: dict[str, Any]) -> Rows:
+    """Returns the rows of a table of docs/steering.md."""
+    rows = []
+    for name, own in _by_label(results):
+        ranges, covered = [MISSING] * 3, MISSING  # of all labels together
+        if "range" in own:
+            ends = own["range"].values()
+            ranges = [f"{low:.2f} to {high:.2f}" for low, high in ends]
+            covered = f"{own['steps_covered']} of {own['steps']}"
+        rows.append([name, *ranges, *_cells(own, STEERING), covered])
+    return rows
+
+
+def disturbed_rows(results: dict[str, Any]) -> Rows:
+    """Returns the rows of a table by gait of docs/robustness.md."""
+    table = disturbed_table(str(results["robot"]), Figures(results))
+    return [[row.title, *(cell.text for cell in row.cells)] for row in table.rows]
+
+
+def level_rows(results: dict[str, Any]) -> Rows:
+    """Returns the rows of a table of all gaits of docs/robustness.md."""
+    return [list(row) for row in levels_table(results["all"])[1]]
+
+
+# Page, results, the line before the table, and its rows.
+_TABLES: tuple[tuple[str, str, str, Callable[[dict[str, Any]], Rows]], ...] = (
+    ("tracking.md", "tracking-{robot}-generated", "{title}:", tracking_rows),
+    ("steering.md", "steering-{robot}", "{title}:", steering_rows),
+    ("robustness.md", "robustness-{robot}", "{title}, by gait; [^\n]+:", disturbed_rows),
+    ("robustness.md", "robustness-{robot}", "{title}, all [^\n]+:", level_rows),
+)
+
+
+def with_results(name: str, page: str) -> str:
+    """Returns the text of a page with the committed results in its tables.
+
+    Raises:
+        ValueError: if a table is not there, or its columns are others.
+    """
+    for file, results, before, rows in _TABLES:
+        for robot in ROBOTS if file == name else ():
+            found = read_json(results_dir() / f"{results.format(robot=robot)}.json")
+            line = before.format(title=TITLES[robot])
+            page = _replaced(page, line, rows(found))
+    return page
+
+
+def _replaced(page: str, line: str, rows: Rows) -> str:
+    table = rf"^([^\n]*{line}\n\n\|[^\n]*\n\|[-:| ]+\|\n)(?:\|[^\n]*\n)+"
+    matches = list(re.finditer(table, page, re.M))
+    if len(matches) != 1:
+        raise ValueError(f"{len(matches)} tables come after {line!r}, not one")
+    match = matches[0]
+    width = match[1].splitlines()[2].count("|") - 1
+    if any(len(row) != width for row in rows):
+        raise ValueError(f"the table after {line!r} has {width} columns")
+    lines = "".join(f"| {' | '.join(row)} |\n" for row in rows)
+    return f"{page[: match.start()]}{match[1]}{lines}{page[match.end() :]}"
+
+
+def _by_label(results: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    yield from results["labels"].items()
+    yield "all", results["all"]
+
+
+def _cells(figures: dict[str, Any], columns: Columns) -> list[str]:
+    return [
+        MISSING if figures[key] is None else f"{factor * figures[key]:.{digits}f}"
+        for key, factor, digits in columns
+    ]
+
+
+if __name__ == "__main__":
+    for name in sorted({table[0] for table in _TABLES}):
+        path = DOCS / name
+        page = with_results(name, path.read_text())
+        with atomic_path(path) as temporary:
+            temporary.write_text(page)
