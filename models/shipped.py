@@ -17,6 +17,35 @@ def pretrained_path(name: str) -> Path:
     return pretrained_dir() / f"{name}.safetensors"
 
 
+def weights_in(folder: Path) -> dict[str, Path]:
+    """Returns the weights in a folder of runs, by "tokenizer", "generator", "policy".
+
+    They are in the folder itself, which may be that of a run, or in those of its runs,
+    such as ``runs/tokenizer/tokenizer.safetensors``. Those that are not there are left
+    out.
+
+    Raises:
+        InputError: if there are none, or several of a kind in the folder's runs.
+    """
+    found: dict[str, Path] = {}
+    for kind in ("tokenizer", "generator", "policy"):
+        name = f"{kind}.safetensors"
+        files = sorted(folder.glob(name)) or sorted(folder.glob(f"[!.]*/{name}"))
+        if len(files) > 1:
+            places = ", ".join(str(file.parent) for file in files)
+            raise InputError(
+                f"Several runs in {str(folder)!r} have a {kind}: {places}; name one "
+                f"with --{kind}, or the folder of a run."
+            )
+        found |= {kind: file for file in files}
+    if not found:
+        raise InputError(
+            f"There are no weights in {str(folder)!r}, nor in the runs in it: neither "
+            "tokenizer.safetensors, generator.safetensors nor policy.safetensors."
+        )
+    return found
+
+
 def policy_variants(robot: Robot) -> dict[str, Path]:
     """Returns the shipped policies of ``robot`` except the main one, by name."""
     prefix = f"policy_{robot.name}_"

@@ -15,7 +15,7 @@ from loco_drake.generation.generate import token_labels
 from loco_drake.generation.motion_model import (
     MotionModel,
     Stream,
-    pretrained_motion_model,
+    motion_model_of,
 )
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import LABELS, GaitLabel, GaitSchedule, parse_schedule
@@ -105,7 +105,10 @@ class ReferenceGenerator(PlanProducer):
         self._config = config or GeneratedReference()
         self._horizon = horizon
         self._config.check()
-        self._model = model or pretrained_motion_model(robot.name)
+        own = self._config
+        self._model = model or motion_model_of(
+            robot.name, own.tokenizer, own.generator
+        )
         # Whether the model learned from grounded motion only.
         self.grounded = self._model.grounded
         self._gait = self.DeclareVectorInputPort("gait", 1)

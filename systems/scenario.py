@@ -35,6 +35,9 @@ class GeneratedReference:
     duration: float = 10.0
     temperature: float = 1.0  # 0 is greedy
     top_p: float = 0.95  # probability of the codes to sample from, the likeliest ones
+    # Weights files of one's own training; null for the shipped ones.
+    tokenizer: Path | None = None
+    generator: Path | None = None
 
     def check(self) -> None:
         """Raises InputError unless every field is valid."""

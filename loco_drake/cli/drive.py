@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 
-from loco_drake.cli.options import Json, Policy, option
+from loco_drake.cli.options import (
+    Generator,
+    Json,
+    Policy,
+    Tokenizer,
+    Weights,
+    option,
+)
 from loco_drake.cli.output import write_json
 from loco_drake.cli.simulation import (
     Pace,
@@ -18,6 +25,7 @@ from loco_drake.cli.simulation import (
     print_figures,
     save_page,
     start_meshcat,
+    use_weights,
 )
 from loco_drake.common.errors import InputError
 from loco_drake.motion.gaits import ANY, ANY_INDEX, GAIT_CHOICES
@@ -61,6 +69,9 @@ class Drive:
     # Repeat a recorded drive to the last bit.
     replay: Path | None = None
     policy: Policy = None
+    tokenizer: Tokenizer = None
+    generator: Generator = None
+    weights: Weights = None
     # Show the drive in the browser, at most at real-time speed. Needed unless there is
     # a table of commands or a recorded drive.
     meshcat: bool = True
@@ -201,11 +212,16 @@ class Drive:
         else:
             scenario = LoadScenario(data=_DEFAULT, overlay=self.overlay)
         override(scenario, robot=self.robot)
-        if self.policy is not None:
-            scenario.policy = TrainedPolicy(weights=self.policy)
         if not isinstance(scenario.reference, GeneratedReference):
             raise InputError("The reference of a scenario to drive must be generated.")
         override(scenario.reference, gait=self.gait, seed=self.seed)
+        use_weights(
+            scenario,
+            weights=self.weights,
+            tokenizer=self.tokenizer,
+            generator=self.generator,
+            policy=self.policy,
+        )
         scenario.disturbances.pushes = True
         if scenario.plant.contact == "cenic":
             # Pictures at other times would change the steps of the integrator.
@@ -231,17 +247,19 @@ class Drive:
             InputError: if a row is amiss, or the generator does not know a gait.
         """
         from loco_drake.control.driving import GAIT, read_commands
-        from loco_drake.generation.motion_model import pretrained_motion_model
+        from loco_drake.generation.motion_model import motion_model_of
 
+        reference: Any = scenario.reference
         if recorded is not None:
             table = recorded.table
         elif self.commands is not None:
-            reference: Any = scenario.reference
             table = read_commands(self.commands, str(reference.gait))
         else:
             return None
         labels = table.rows[:, GAIT].astype(np.int64)
-        model = pretrained_motion_model(scenario.robot)
+        model = motion_model_of(
+            scenario.robot, reference.tokenizer, reference.generator
+        )
         model.check_labels(labels[labels != ANY_INDEX])
         return table
 
@@ -266,29 +284,37 @@ def _header(scenario: "Scenario", recorded: "DriveFile | None") -> dict[str, Any
     """Returns what a recorded drive says of its scenario.
 
     Raises:
-        InputError: if the weights of the policy are not those of ``recorded``.
+        InputError: if weights are not there, or not those of ``recorded``.
     """
     from loco_drake.models.robots import get_robot
-    from loco_drake.models.shipped import policy_path
+    from loco_drake.models.shipped import policy_path, pretrained_path
     from loco_drake.systems.scenario import DumpScenario
 
     policy: Any = scenario.policy
-    path = policy_path(get_robot(scenario.robot), policy.weights)
-    if not path.is_file():
-        raise InputError(f"There are no policy weights at {str(path)!r}.")
-    weights = hashlib.sha256(path.read_bytes()).hexdigest()
-    if recorded is not None and weights != recorded.header["policy_sha256"]:
-        raise InputError(
-            f"The weights at {path} are not those of the recorded drive; name these "
-            "with --policy."
-        )
     reference: Any = scenario.reference
+    paths = {
+        "policy": policy_path(get_robot(scenario.robot), policy.weights),
+        "tokenizer": reference.tokenizer or pretrained_path("tokenizer"),
+        "generator": reference.generator or pretrained_path("generator"),
+    }
+    hashes = {}
+    for kind, path in paths.items():
+        if not path.is_file():
+            raise InputError(f"There are no {kind} weights at {str(path)!r}.")
+        weights = hashlib.sha256(path.read_bytes()).hexdigest()
+        # Earlier drives tell the policy's only.
+        if recorded and recorded.header.get(f"{kind}_sha256", weights) != weights:
+            raise InputError(
+                f"The weights at {path} are not those of the recorded drive; name these "
+                f"with --{kind}."
+            )
+        hashes[f"{kind}_sha256"] = weights
     return {
         "robot": scenario.robot,
         "gait": str(reference.gait),
         "seed": int(reference.seed),
         "scenario": DumpScenario(scenario),
-        "policy_sha256": weights,
+        **hashes,
     }
 
 

@@ -55,9 +55,8 @@ class Generate:
         """Writes the files and prints the figures; returns 0."""
         from loco_drake.control.steered_motion import steered_motion
         from loco_drake.generation import generate
-        from loco_drake.generation.motion_model import load_motion_model
+        from loco_drake.generation.motion_model import motion_model_of
         from loco_drake.models.robots import ROBOTS
-        from loco_drake.models.shipped import pretrained_path
         from loco_drake.retargeting.grounding import ground
         from loco_drake.retargeting.inverse_kinematics import LegSolver
 
@@ -70,11 +69,7 @@ class Generate:
         check_choice("robot", self.robot, ROBOTS)
         check_at_least("count", self.count, 1)
         check_at_least("seed", self.seed, 0)
-        model = load_motion_model(
-            self.tokenizer or pretrained_path("tokenizer"),
-            self.generator or pretrained_path("generator"),
-            self.robot,
-        )
+        model = motion_model_of(self.robot, self.tokenizer, self.generator)
         solver = LegSolver(model.robot, FPS) if self.ground else None
         seconds, frames = 0.0, 0
         for first in range(self.seed, self.seed + self.count, BATCH):

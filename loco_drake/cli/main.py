@@ -30,6 +30,7 @@ _COMMANDS = {
     "train recipe": "train a tracking policy from nothing, in stages",
     "train student": "train a policy without privileged observations, by a teacher",
     "train classifier": "train the transformer that classifies gaits",
+    "runs list": "list trainings, how far they are and what they score",
     "export": "write a policy, a plan or a robot for use without Drake",
     "evaluate retargeting": "measure retargeted motion",
     "evaluate tokenizer": "measure reconstruction by the tokenizer",
@@ -40,7 +41,7 @@ _COMMANDS = {
     "report": "write one HTML page of all results",
 }
 # Of most commands the module is called like them, "train_tracker".
-_MODULES = {"data list": "data", "data fetch": "fetch", "data inspect": "data"}
+_MODULES = {"data list": "data", "data fetch": "fetch", "data inspect": "data", "runs list": "runs"}
 _HELP = ("-h", "--help")
 # Options that name an output. Whether it is writable is checked before the work.
 _OUTPUTS = ("json", "html", "out", "figures", "record", "plans")

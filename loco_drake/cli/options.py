@@ -38,6 +38,13 @@ Policy = Annotated[
         default="the robot's main policy",
     ),
 ]
+Weights = Annotated[
+    Path | None,
+    option(
+        "Folder of a run or of runs, whose tokenizer, generator and policy to take.",
+        default="the shipped ones",
+    ),
+]
 Tokenizer = Annotated[
     Path | None, option("Weights from `train tokenizer`.", default="the shipped ones")
 ]

@@ -4,7 +4,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from loco_drake.cli.options import Json, Policy, option
+from loco_drake.cli.options import (
+    Generator,
+    Json,
+    Policy,
+    Tokenizer,
+    Weights,
+    option,
+)
 from loco_drake.cli.output import write_json
 from loco_drake.cli.simulation import (
     Pace,
@@ -13,6 +20,7 @@ from loco_drake.cli.simulation import (
     print_figures,
     save_page,
     start_meshcat,
+    use_weights,
 )
 from loco_drake.common.errors import InputError
 from loco_drake.motion.gaits import ANY, parse_schedule
@@ -43,6 +51,9 @@ class Simulate:
     # gpt, to generate motion during the simulation, or the path of a Motion file.
     reference: Annotated[str | None, option(metavar="STR", default="gpt")] = None
     policy: Policy = None
+    tokenizer: Tokenizer = None
+    generator: Generator = None
+    weights: Weights = None
     # Show the simulation in the browser, at most at real-time speed.
     meshcat: bool = True
     # Keep the robot in the middle of the page, live and in the replay; otherwise the
@@ -129,8 +140,6 @@ class Simulate:
         override(scenario, robot=self.robot)
         names = ("contact", "time_step", "friction")
         override(scenario.plant, **{name: getattr(self, name) for name in names})
-        if self.policy is not None:
-            scenario.policy = TrainedPolicy(weights=self.policy)
         if self.reference == "gpt":
             if not isinstance(scenario.reference, GeneratedReference):
                 scenario.reference = GeneratedReference()
@@ -141,6 +150,13 @@ class Simulate:
                     f"{self.reference!r}."
                 )
             scenario.reference = MotionReference(path=Path(self.reference))
+        use_weights(
+            scenario,
+            weights=self.weights,
+            tokenizer=self.tokenizer,
+            generator=self.generator,
+            policy=self.policy,
+        )
         reference = scenario.reference
         if isinstance(reference, GeneratedReference):
             given = {"gait": self.gait, "seed": self.seed, "duration": self.duration}

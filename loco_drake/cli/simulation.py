@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
 
     from loco_drake.evaluation.tracking import Recorder
+    from loco_drake.systems.scenario import Scenario
 
 _MAX_DURATION = 3600.0
 # A simulation that is this far behind, s, goes on from there rather than hurry.
@@ -24,6 +25,40 @@ def override(config: Any, **given: Any) -> None:
     for name, value in given.items():
         if value is not None:
             setattr(config, name, value)
+
+
+def use_weights(
+    scenario: "Scenario",
+    *,
+    weights: Path | None,
+    tokenizer: Path | None,
+    generator: Path | None,
+    policy: Path | None,
+) -> None:
+    """Lets a scenario take weights of one's own; single files go before ``weights``.
+
+    Raises:
+        InputError: if the folder ``weights`` has none, or several of a kind; or if the
+            motion is not generated and ``tokenizer`` or ``generator`` is given.
+    """
+    from loco_drake.models.shipped import weights_in
+    from loco_drake.systems.scenario import GeneratedReference, TrainedPolicy
+
+    found = weights_in(weights) if weights is not None else {}
+    policy = policy or found.get("policy")
+    if policy is not None:
+        scenario.policy = TrainedPolicy(weights=policy)
+    reference = scenario.reference
+    if isinstance(reference, GeneratedReference):
+        override(
+            reference,
+            tokenizer=tokenizer or found.get("tokenizer"),
+            generator=generator or found.get("generator"),
+        )
+    elif tokenizer is not None or generator is not None:
+        raise InputError(
+            "--tokenizer and --generator write motion, and the reference is a file."
+        )
 
 
 def check_duration(duration: float) -> None:

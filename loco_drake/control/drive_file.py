@@ -34,6 +34,8 @@ _FIELDS: dict[str, type] = {
     "states_sha256": str,  # see states_sha256
     "loco_drake": str,  # version that wrote the file
 }
+# The same, which earlier files lack.
+_LATER: dict[str, type] = {"tokenizer_sha256": str, "generator_sha256": str}
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +60,12 @@ def save_drive(path: Path, table: OrderTable, **header: Any) -> None:
         orders[GAIT] = gait_name(int(row[GAIT]))
         lines.append(json.dumps([float(time), *orders]))
     content = "\n".join(lines)
+    fields = {**header, "loco_drake": __version__}
     full = {
         "kind": _KIND,
         "schema_version": _SCHEMA_VERSION,
-        **{name: {**header, "loco_drake": __version__}[name] for name in _FIELDS},
+        **{name: fields[name] for name in _FIELDS},
+        **{name: fields[name] for name in _LATER if name in fields},
         "columns": list(COLUMNS),
     }
     full["content_sha256"] = content_sha256(full, {"rows": content.encode()})
@@ -96,8 +100,8 @@ def load_drive(path: Path) -> Drive:
             "hash."
         )
     try:
-        for name, kind in _FIELDS.items():
-            if type(header.get(name)) is not kind:
+        for name, kind in (_FIELDS | _LATER).items():
+            if (name in _FIELDS or name in header) and type(header.get(name)) is not kind:
                 raise InputError(f"its header lacks {name}.")
         if header.get("columns") != list(COLUMNS):
             raise InputError(f"its columns must be {', '.join(COLUMNS)}.")

@@ -308,6 +308,25 @@ def load_motion_model(tokenizer: Path, generator: Path, robot: str) -> MotionMod
     return MotionModel(load_tokenizer(tokenizer), load_generator(generator), robot)
 
 
+def motion_model_of(
+    robot: str, tokenizer: Path | None = None, generator: Path | None = None
+) -> MotionModel:
+    """Returns a motion model for ``robot``; None stands for the shipped weights.
+
+    The shipped model is loaded once.
+
+    Raises:
+        InputError: as :func:`load_motion_model`.
+    """
+    if tokenizer is generator is None:
+        return pretrained_motion_model(robot)
+    return load_motion_model(
+        tokenizer or pretrained_path("tokenizer"),
+        generator or pretrained_path("generator"),
+        robot,
+    )
+
+
 @lru_cache
 def pretrained_motion_model(robot: str) -> MotionModel:
     """Returns the shipped motion model for ``robot``, loaded once.
