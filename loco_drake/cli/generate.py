@@ -4,7 +4,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from loco_drake.cli.options import Generator, Json, Tokenizer
+from loco_drake.cli.options import Generator, Json, Tokenizer, Weights
 from loco_drake.cli.output import print_table, write_json
 from loco_drake.common.errors import check_at_least, check_choice
 from loco_drake.motion.gaits import parse_schedule
@@ -49,6 +49,7 @@ class Generate:
     top_p: float = 0.95
     tokenizer: Tokenizer = None
     generator: Generator = None
+    weights: Weights = None
     json: Json = None
 
     def run(self) -> int:
@@ -57,6 +58,7 @@ class Generate:
         from loco_drake.generation import generate
         from loco_drake.generation.motion_model import motion_model_of
         from loco_drake.models.robots import ROBOTS
+        from loco_drake.models.shipped import weights_in
         from loco_drake.retargeting.grounding import ground
         from loco_drake.retargeting.inverse_kinematics import LegSolver
 
@@ -69,7 +71,12 @@ class Generate:
         check_choice("robot", self.robot, ROBOTS)
         check_at_least("count", self.count, 1)
         check_at_least("seed", self.seed, 0)
-        model = motion_model_of(self.robot, self.tokenizer, self.generator)
+        found = weights_in(self.weights) if self.weights is not None else {}
+        model = motion_model_of(
+            self.robot,
+            self.tokenizer or found.get("tokenizer"),
+            self.generator or found.get("generator"),
+        )
         solver = LegSolver(model.robot, FPS) if self.ground else None
         seconds, frames = 0.0, 0
         for first in range(self.seed, self.seed + self.count, BATCH):

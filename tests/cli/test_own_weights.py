@@ -9,6 +9,7 @@ from loco_drake.cli.main import main
 from loco_drake.common.errors import InputError
 from loco_drake.common.weights import save_network
 from loco_drake.models.shipped import weights_in
+from loco_drake.motion.motion_file import load_motion
 from tests.tiny_model import make_tiny_model
 
 TINY = ("tokenizer", "generator")
@@ -92,3 +93,17 @@ def test_a_recorded_drive_knows_its_weights(runs, tmp_path, capsys):
     assert main(["drive", "--no-meshcat", "--replay", str(drive)]) == 2
     error = capsys.readouterr().err
     assert "not those of the recorded drive; name these with --generator" in error
+
+
+def test_motion_is_generated_with_the_weights_of_a_folder(runs, tmp_path):
+    files = weights_in(runs)
+    line = ["generate", "--gait", "dog-trot", "--duration", "0.2", "--out"]
+    single = [x for kind in TINY for x in (f"--{kind}", str(files[kind]))]
+    for name, options in (("a", ["--weights", str(runs)]), ("b", single), ("c", [])):
+        assert main([*line, str(tmp_path / name), *options]) == 0
+    first, second, shipped = (
+        load_motion(tmp_path / name / "dog-trot-0.npz").joint_positions
+        for name in ("a", "b", "c")
+    )
+    assert (first == second).all()
+    assert not (first == shipped).all()
