@@ -3,15 +3,12 @@
 A classifier of all labels is trained on one set of trajectories and tested on another
 (GAN-train and GAN-test of Shmelkov, Schmid, Alahari 2018):
 
-=================== ==================================================================
-real_to_real        trained on recordings, tested on recordings of other subjects
-real_to_generated   trained on recordings, tested on generated motion: quality
-generated_to_real   trained on generated motion, tested on the recordings of validation:
-                    diversity
-generated_to_real_matched
-                    the same, with no more generated trajectories of a label than the
-                    recordings to train on have
-=================== ==================================================================
+* real_to_real: trained on recordings, tested on recordings of other subjects
+* real_to_generated: trained on recordings, tested on generated motion: quality
+* generated_to_real: trained on generated motion, tested on the recordings of
+  validation: diversity
+* generated_to_real_matched: the same, with no more generated trajectories of a label
+  than the recordings to train on have
 
 Accuracies are means over labels, each of which weighs the same; mirror images count
 half. Rows of a source are of the same classifier, over the labels of that source.

@@ -4,22 +4,20 @@ The figures of a clip are those of :mod:`loco_drake.motion.quality`,
 :class:`loco_drake.retargeting.retarget.RetargetReport` and :class:`GaitFidelity`. A
 label's figures are made of its clips':
 
-======================== ==============================================================
-stance_slip_median_mps   median over all steps of all toes in stance of all clips
-penetration_max_m        the worst clip's
-joint_limit_violations   summed
-joint_speed_ratio_max    the worst clip's
-toe_error_rmse_m         root of the mean square over all frames and toes of all clips
-correction_rmse_m        the same
-trunk_correction_rmse_m  root of the mean square over all frames of all clips
-stride_period_error, phase_lag_error, duty_factor_error
-                         mean over the clips of at least three strides
-clips                    their number; those that failed are not counted
-frames_per_second        frames of motion over seconds of computing in one process,
-                         reading excluded
-figures of grounding     root of the mean square over all frames of all clips that have
-                         the figure; only if motion is grounded
-======================== ==============================================================
+* stance_slip_median_mps: median over all steps of all toes in stance of all clips
+* penetration_max_m: the worst clip's
+* joint_limit_violations: summed
+* joint_speed_ratio_max: the worst clip's
+* toe_error_rmse_m: root of the mean square over all frames and toes of all clips
+* correction_rmse_m: the same
+* trunk_correction_rmse_m: root of the mean square over all frames of all clips
+* stride_period_error, phase_lag_error, duty_factor_error: mean over the clips of at
+  least three strides
+* clips: their number; those that failed are not counted
+* frames_per_second: frames of motion over seconds of computing in one process,
+  reading excluded
+* figures of grounding: root of the mean square over all frames of all clips that have
+  the figure; only if motion is grounded
 """
 
 from collections.abc import Iterable, Iterator, Sequence

@@ -5,16 +5,13 @@ that of the model, or is drawn for its label and seed from a
 :class:`loco_drake.tracking.randomization.RandomizationConfig`. A label's figures are
 made of its episodes':
 
-======================== ==============================================================
-normalized_return        mean; the worst episode's beside it
-fall_rate                share of episodes
-joint_rmse_rad, base_position_rmse_m, base_orientation_rmse_rad
-                         root of the mean square over all samples of all episodes
-stance_slip_median_mps   median over all steps of all toes in stance of all episodes
-stretch, speed_mps, torque_saturation, speed_saturation, cost_of_transport
-                         mean
-real_time_factor         simulated over wall seconds inside AdvanceTo, warm
-======================== ==============================================================
+* normalized_return: mean; the worst episode's beside it
+* fall_rate: share of episodes
+* joint_rmse_rad, base_position_rmse_m, base_orientation_rmse_rad: root of the mean
+  square over all samples of all episodes
+* stance_slip_median_mps: median over all steps of all toes in stance of all episodes
+* stretch, speed_mps, torque_saturation, speed_saturation, cost_of_transport: mean
+* real_time_factor: simulated over wall seconds inside AdvanceTo, warm
 """
 
 from collections.abc import Iterable, Iterator, Sequence

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, check_bounds
 from loco_drake.generation.motion_model import MotionModel
-from loco_drake.motion.gaits import ROW_LABELS, GaitLabel, GaitSchedule
+from loco_drake.motion.gaits import ROW_LABELS, GaitLabel, GaitSchedule, parse_label
 from loco_drake.motion.motion import FPS, GROUNDED, LEARNED_FROM, Motion
 
 Integers = NDArray[np.int64]
@@ -119,9 +119,13 @@ def token_labels(model: MotionModel, schedule: GaitSchedule, first: int) -> Inte
 
 
 def generate_motion(
-    model: MotionModel, label: GaitLabel, duration: float, seed: int
+    model: MotionModel, label: GaitLabel | str, duration: float, seed: int
 ) -> Motion:
-    """Generates one motion; see :func:`generate_motions`."""
+    """Generates one motion; see :func:`generate_motions`.
+
+    The label may be a text, such as "dog-trot".
+    """
+    label = parse_label(label) if isinstance(label, str) else label
     (motion,) = generate_motions(model, label, duration, [seed])
     return motion
 

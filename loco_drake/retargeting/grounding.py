@@ -3,7 +3,7 @@
 Toes keep their paths in the world, and with them footholds, clearance, stride period
 and phase lags. In each frame the trunk is turned by a small rotation vector theta and
 shifted by d, both in the world, and the legs follow. With x = [theta, d] of all frames
-and f the forces of the feet in contact, a convex program finds
+and f the forces of the feet in contact, a convex program finds the minimum:
 
     min  |x|^2 + |D x|^2 + |change of joints|^2 + |change of f|^2 + |s|^2
     s.t. s = what f does not give of the wrench [L', m (c'' - g)],
