@@ -64,7 +64,8 @@ class DataInspect:
 
     # A recording.
     file: tyro.conf.Positional[Path]
-    # Source whose format the file has: dog, horse, mpc or solo8.
+    # Source whose format the file has: dog, horse, mpc, solo8, or a YAML file that
+    # names the joints of another animal's, see docs/own_animal.md.
     source: str = "dog"
     # First frame, counted from 0 at the file's rate. Default: the first usable one.
     start: int | None = None
@@ -80,11 +81,11 @@ class DataInspect:
     def run(self) -> int:
         """Writes the picture and prints the table; returns 0."""
         from loco_drake.datasets.registry import read_clip
+        from loco_drake.datasets.skeleton import load_source
         from loco_drake.retargeting.inspection import clip_figure, summarize
 
-        clip = read_clip(
-            self.source, self.file, "unknown", self.start, self.end, self.fps
-        )
+        source = load_source(self.source)
+        clip = read_clip(source, self.file, "unknown", self.start, self.end, self.fps)
         summary, contacts = summarize(clip)
         stretch = f"{self.file.stem}-{clip.provenance['frames']}"
         out = self.out or Path(f"{stretch}.png")

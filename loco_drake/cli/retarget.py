@@ -33,7 +33,8 @@ class Retarget:
 
     # A recording; needs --source and --gait.
     file: tyro.conf.Positional[Path | None] = None
-    # Source of the recordings: dog, horse, mpc or solo8. Default: all.
+    # Source of the recordings: dog, horse, mpc, solo8, or a YAML file that names the
+    # joints of another animal's, see docs/own_animal.md. Default: all.
     source: str | None = None
     # Gait, such as trot; may be repeated. Default: the gaits of the fifteen labels.
     gait: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
@@ -79,7 +80,7 @@ class Retarget:
 
         It is 1 if a clip failed, or is outside its bounds with --strict, else 0.
         """
-        from loco_drake.datasets.registry import DATASETS
+        from loco_drake.datasets.skeleton import load_source
         from loco_drake.models.robot_files import load_robot
         from loco_drake.models.robots import ROBOTS
         from loco_drake.retargeting.retarget import retarget_segments
@@ -94,7 +95,7 @@ class Retarget:
         if self.ground:
             check_choice("robot to ground", robot.name, ROBOTS)
         if self.source is not None:
-            check_choice("source", self.source, DATASETS)
+            self.source = load_source(self.source)
         segments, split = self._segments()
         variant = Variant(mirror=self.mirror, froude=self.froude, ground=self.ground)
         out = self.out or Path("motions") / f"{robot.name}{variant.suffix}"

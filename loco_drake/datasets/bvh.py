@@ -88,7 +88,8 @@ class Bvh:
             below = (
                 index
                 for index, joint in enumerate(self.joints)
-                if _plain(joint.name) == _plain(name) and self._is_below(index, found)
+                if plain_name(joint.name) == plain_name(name)
+                and self._is_below(index, found)
             )
             found = next(below, -1)
             if found < 0:
@@ -202,6 +203,6 @@ def _parse_hierarchy(text: str) -> list[Joint]:
     return joints
 
 
-def _plain(name: str) -> str:
+def plain_name(name: str) -> str:
     """Returns a joint's name without namespace, and without regard to case."""
     return re.split(r"[:|]", name)[-1].strip().lower()

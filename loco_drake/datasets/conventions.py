@@ -89,7 +89,7 @@ def orient(points: Array, body: Body, notes: dict[str, str]) -> Array:
     check_frames(points)
     if not all_seen(points).any():
         return points
-    points = _turn_up(points, notes)
+    points = turn_up(points, notes)
     seen = points[all_seen(points)]
     for name, value, (low, high) in (
         ("long", _trunk_length(seen), body.trunk),
@@ -103,7 +103,12 @@ def orient(points: Array, body: Body, notes: dict[str, str]) -> Array:
     return _name_toes(points, notes)
 
 
-def _turn_up(points: Array, notes: dict[str, str]) -> Array:
+def turn_up(points: Array, notes: dict[str, str]) -> Array:
+    """Returns points (T, 6, 3) with z up, and notes whether that turned them.
+
+    Raises:
+        InputError: if the trunk is above the toes along no axis.
+    """
     seen = points[all_seen(points)]
     up = np.median(seen[:, :2].mean(axis=1) - np.median(seen[:, 2:], axis=1), axis=0)
     if not np.linalg.norm(up) > 0 or not _trunk_length(seen) > 0:
@@ -120,8 +125,13 @@ def _turn_up(points: Array, notes: dict[str, str]) -> Array:
     if axis == 2 and cosines[2] > 0:
         return points
     notes["up"] = "turned upright, since another axis than the format's points up"
+    return with_z_up(points, axis, cosines[axis] > 0)
+
+
+def with_z_up(points: Array, axis: int, upward: bool = True) -> Array:
+    """Returns points (..., 3) turned so that ``axis``, or its opposite, becomes z."""
     turned = points[..., [(axis + 1) % 3, (axis + 2) % 3, axis]]
-    return turned * (1.0, -1.0, -1.0) if cosines[axis] < 0 else turned
+    return turned if upward else turned * (1.0, -1.0, -1.0)
 
 
 def _name_toes(points: Array, notes: dict[str, str]) -> Array:

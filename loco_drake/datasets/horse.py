@@ -18,24 +18,23 @@ import re
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import CubicSpline, make_smoothing_spline
+from scipy.interpolate import make_smoothing_spline
 from scipy.ndimage import binary_erosion
 
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
-from loco_drake.common.runs import intervals
 from loco_drake.datasets.conventions import (
     GRAVITY,
     ground_height,
     orient,
     stride_of,
 )
+from loco_drake.datasets.gaps import LONGEST_GAP, mend_gaps, usable_stretch
 from loco_drake.datasets.recording import (
     Body,
     Recording,
     all_seen,
     check_frames,
-    check_range,
     check_rate,
     check_told,
     read_lines,
@@ -53,8 +52,6 @@ RATE_OF_DAY = {"1": 60.0, "2": 120.0, "3": 120.0}
 # Haflingers measure 1.25 to 1.35 m at the withers, .68 to .85 m from there to the
 # sacrum; their strides last 1.7 to 3.3 units of time.
 BODY = Body(trunk=(0.4, 1.3), height=(0.9, 1.9), stride=(1.2, 4.5), jump=0.17)
-# Gaps up to this long are bridged, s.
-LONGEST_GAP = 0.1
 # Times are rounded to 1 ms.
 TIME_TOLERANCE = 0.003
 
@@ -111,10 +108,10 @@ def read_horse(
             "or _M3_) and its strides are too few, or not those of a horse; give its "
             "frames per second with --fps 60 or --fps 120."
         )
-    points, bridged = _mend_gaps(points, round(LONGEST_GAP * rate))
+    points, bridged = mend_gaps(points, round(LONGEST_GAP * rate))
     if bridged:
         notes["gaps"] = f"{bridged} frames bridged"
-    whole, first = _usable_stretch(points, start, end)
+    whole, first = usable_stretch(points, start, end)
     points = points[whole]
     velocity = _trunk_velocity(points, rate)
     moved = points - points[:, :1] * (1.0, 1.0, 0.0)
@@ -166,51 +163,6 @@ def _infer_rate(points: Array) -> float | None:
     ratios = {rate: abs(np.log(frames / rate / seconds)) for rate in RATES}
     best = min(RATES, key=lambda rate: ratios[rate])
     return best if ratios[best] < np.log(MAX_RATIO) else None
-
-
-def _mend_gaps(points: Array, longest: int) -> tuple[Array, int]:
-    """Returns points (T, N, 3) with short gaps bridged by splines, and their frames.
-
-    Gaps at an end, or of more than ``longest`` frames, stay.
-    """
-    points = points.copy()
-    bridged = np.zeros(len(points), dtype=bool)
-    frames = np.arange(len(points))
-    for marker in range(points.shape[1]):
-        seen = all_seen(points[:, marker])
-        if seen.all() or seen.sum() < 4:
-            continue
-        spline = CubicSpline(frames[seen], points[seen, marker])
-        for start, end in intervals(~seen):
-            if end - start <= longest and start > 0 and end < len(points):
-                points[start:end, marker] = spline(frames[start:end])
-                bridged[start:end] = True
-    return points, int(bridged.sum())
-
-
-def _usable_stretch(
-    points: Array, start: int | None, end: int | None
-) -> tuple[slice, int]:
-    """Returns the frames without gaps around a stretch, and its first frame.
-
-    Without ``start`` and ``end`` it is the longest there is. Raises InputError if it
-    does not lie within the file, or has a gap.
-    """
-    whole = all_seen(points)
-    runs = list(intervals(whole))
-    if not runs:
-        raise InputError("it has no frame in which all markers were seen.")
-    longest = max(runs, key=lambda run: run[1] - run[0])
-    if start is None and end is None:
-        return slice(*longest), longest[0]
-    first, stop = check_range(start, end, len(points))
-    for run in runs:
-        if run[0] <= first and stop <= run[1]:
-            return slice(*run), first
-    raise InputError(
-        f"markers are missing within frames {first} to {stop} of it; its longest "
-        f"stretch without long gaps is {longest[0]} to {longest[1]}."
-    )
 
 
 def _trunk_velocity(points: Array, fps: float) -> Array:

@@ -2,11 +2,12 @@
 
 import logging
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydrake.common.yaml import yaml_load
@@ -45,9 +46,11 @@ class Dataset:
     # format.
     read: Callable[[Path, int | None, int | None, float | None], Recording]
     body: Body = field(default_factory=Body)  # bounds that recordings must satisfy
-    # YAML file of its retargeting configuration, see retargeting.scaling; if None,
-    # loco_drake/retargeting/sources/SOURCE.yaml or the defaults.
-    config: Path | None = None
+    # Its retargeting configuration, see retargeting.scaling, or a YAML file of it; if
+    # None, loco_drake/retargeting/sources/SOURCE.yaml or the defaults.
+    config: Path | Mapping[str, Any] | None = None
+    # The YAML file that describes it, see datasets.skeleton.
+    definition: Path | None = None
 
 
 DATASETS: dict[str, Dataset] = {}
@@ -55,6 +58,8 @@ DATASETS: dict[str, Dataset] = {}
 
 def register_dataset(dataset: Dataset) -> None:
     """Registers a source in this process; an entry point registers it in all.
+
+    A source from the same YAML file is replaced.
 
     Raises:
         InputError: if its name or folder cannot be, or is taken.
@@ -67,6 +72,8 @@ def register_dataset(dataset: Dataset) -> None:
     if dataset.folder in ("", ".", "..") or Path(dataset.folder).name != dataset.folder:
         raise InputError(f"{dataset.folder!r} is not the name of a dataset's folder.")
     for other in DATASETS.values():
+        if other.definition is not None and other.definition == dataset.definition:
+            continue
         if dataset.source == other.source or dataset.folder == other.folder:
             raise InputError(
                 f"There is a source {other.source!r} in the folder {other.folder!r}."

@@ -12,6 +12,7 @@ import numpy as np
 from loco_drake.common.errors import InputError
 from loco_drake.common.parallel import map_in_workers
 from loco_drake.datasets.segments import Segment
+from loco_drake.datasets.skeleton import load_sources, loaded_files
 from loco_drake.datasets.split import Split
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.models.robot_files import load_robot
@@ -236,13 +237,20 @@ def retarget_segments(
     Yields:
         One outcome for each segment, in their order, as soon as it is done.
     """
-    make = partial(_make_writer, robot.definition, Path(out_dir), split, variant)
+    make = partial(
+        _make_writer, robot.definition, Path(out_dir), split, variant, loaded_files()
+    )
     return map_in_workers(make, segments, workers)
 
 
 def _make_writer(
-    robot: str, out_dir: Path, split: Split | None, variant: Variant
+    robot: str,
+    out_dir: Path,
+    split: Split | None,
+    variant: Variant,
+    skeletons: tuple[Path, ...],
 ) -> Callable[[Segment], Outcome]:
+    load_sources(skeletons)
     retarget = SegmentRetargeter(load_robot(robot), split, variant)
 
     def write(segment: Segment) -> Outcome:

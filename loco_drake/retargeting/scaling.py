@@ -30,6 +30,7 @@ contacts are found before the clock is changed, and cut-off frequencies change w
 The clearance of a swing and the limits of the joints are the robot's.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite, sqrt
 from pathlib import Path
@@ -45,6 +46,7 @@ from loco_drake.common.rotations import (
     quat_rotate,
     yaw_quat,
 )
+from loco_drake.common.typed import FieldError, convert
 from loco_drake.common.typed_yaml import read_yaml
 from loco_drake.datasets.registry import get_dataset
 from loco_drake.models.quadruped import Quadruped
@@ -113,7 +115,15 @@ def load_config(source: str) -> RetargetConfig:
     Raises:
         InputError: naming the sources that there are.
     """
-    own, shipped = get_dataset(source).config, _SOURCES / f"{source}.yaml"
+    dataset, shipped = get_dataset(source), _SOURCES / f"{source}.yaml"
+    own = dataset.config
+    if isinstance(own, Mapping):
+        where = dataset.definition or f"the configuration of {source}"
+        try:
+            config: RetargetConfig = convert(own, RetargetConfig, numeric_text=True)
+        except FieldError as error:
+            raise InputError(f"{where}: retargeting: {error}.") from None
+        return _checked(config, f"{where}: retargeting")
     if own is None and not shipped.is_file():
         return RetargetConfig()
     return read_config(own or shipped)
@@ -126,7 +136,13 @@ def read_config(path: Path) -> RetargetConfig:
         InputError: if the file is missing, names an unknown field, or holds a value
             that cannot be.
     """
-    config = read_yaml(path, RetargetConfig, "a retargeting configuration")
+    return _checked(
+        read_yaml(path, RetargetConfig, "a retargeting configuration"), path
+    )
+
+
+def _checked(config: RetargetConfig, where: Path | str) -> RetargetConfig:
+    """Returns the configuration; raises InputError if a value cannot be."""
     above_0 = {
         "swing_height": config.swing_height,
         "stance_height": 1.0 if config.stance_height is None else config.stance_height,
@@ -134,12 +150,12 @@ def read_config(path: Path) -> RetargetConfig:
         **{f"contact.{key}": value for key, value in vars(config.contact).items()},
     }
     for name, value in above_0.items():
-        check_bounds(f"{path}: {name}", value, 0, above=True)
+        check_bounds(f"{where}: {name}", value, 0, above=True)
     for name in ("front_hip", "rear_hip", "hip_spread", "base_height_offset"):
         if not isfinite(value := getattr(config, name)):
-            raise InputError(f"{path}: {name} must be finite, not {value}.")
+            raise InputError(f"{where}: {name} must be finite, not {value}.")
     if not 0 <= config.stance_height_percentile <= 100:
-        raise InputError(f"{path}: stance_height_percentile must be within 0 to 100.")
+        raise InputError(f"{where}: stance_height_percentile must be within 0 to 100.")
     return config
 
 
