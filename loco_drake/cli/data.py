@@ -9,6 +9,7 @@ import tyro
 
 from loco_drake.cli.options import DataDir, Json, UnusedSeed
 from loco_drake.cli.output import print_table, write_figure, write_json
+from loco_drake.common.errors import InputError
 
 if TYPE_CHECKING:
     from loco_drake.retargeting.inspection import ClipSummary
@@ -60,7 +61,11 @@ class DataList:
 
 @dataclass(kw_only=True)
 class DataInspect:
-    """Plot toe heights, contacts and speeds of one stretch of a recording."""
+    """Plot toe heights, contacts and speeds of one stretch of a recording.
+
+    With --skeleton, print what any BVH file or table of points holds, and propose the
+    YAML file that makes it a source; see docs/own_animal.md.
+    """
 
     # A recording.
     file: tyro.conf.Positional[Path]
@@ -73,13 +78,18 @@ class DataInspect:
     end: int | None = None
     # Rate in frames/s. Default: inferred from format, name or motion.
     fps: float | None = None
-    # PNG file to write. Default: the name of the recording, in the current folder.
+    # Print joints, rate, axes and unit, and propose a skeleton's YAML file.
+    skeleton: bool = False
+    # PNG file to write. Default: the name of the recording, in the current folder. With
+    # --skeleton the YAML file; default: none, it is printed.
     out: Path | None = None
     json: Json = None
     seed: UnusedSeed = 0
 
     def run(self) -> int:
-        """Writes the picture and prints the table; returns 0."""
+        """Writes picture or YAML file, and prints the figures; returns 0."""
+        if self.skeleton:
+            return self._inspect_skeleton()
         from loco_drake.datasets.registry import read_clip
         from loco_drake.datasets.skeleton import load_source
         from loco_drake.retargeting.inspection import clip_figure, summarize
@@ -93,6 +103,17 @@ class DataInspect:
         licence = clip.provenance["licence"]
         write_json(self.json, {**asdict(summary), "licence": licence})
         print_table(f"{stretch}, drawn in {out}", ["", "value"], _rows(summary))
+        return 0
+
+    def _inspect_skeleton(self) -> int:
+        from loco_drake.cli.inspect_skeleton import inspect_skeleton
+
+        if self.source != "dog" or (self.start, self.end) != (None, None):
+            raise InputError(
+                "--skeleton reads the whole of any file; it takes no --source, --start "
+                "and --end."
+            )
+        write_json(self.json, inspect_skeleton(self.file, self.fps, self.out))
         return 0
 
 

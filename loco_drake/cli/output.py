@@ -62,6 +62,12 @@ def print_table(
     Console(width=None if sys.stdout.isatty() else 160).print(table)
 
 
+def print_lines(lines: Iterable[str]) -> None:
+    """Prints lines to stdout as they are; names in them may hold anything."""
+    for line in lines:
+        print(one_line(line))
+
+
 def tracked(items: Iterable[Item], what: str, total: int) -> Iterable[Item]:
     """Yields items and shows in a terminal how many of ``total`` there have been."""
     console = Console(stderr=True)

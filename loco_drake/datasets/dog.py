@@ -64,7 +64,8 @@ def read_dog(
         raise InputError(
             f"its skeleton is another, which lacks {missing} where a dog's has it; "
             "that has the joints "
-            f"{', '.join(name for name in names if name != END_SITE)}."
+            f"{', '.join(name for name in names if name != END_SITE)}; for another "
+            "animal, loco-drake data inspect FILE --skeleton proposes what to name."
         ) from None
     points = bvh.positions()[:, found] / 100
     # The file rounds the time of a frame to six digits.

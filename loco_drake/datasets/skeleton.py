@@ -37,7 +37,7 @@ from loco_drake.models.legs import LEGS
 
 SUFFIXES = (".yaml", ".yml")
 # Metres in each.
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 
 # A joint, a path of joints, the number of a point, or several whose middle it is.
@@ -90,13 +90,17 @@ def read_skeleton(path: Path) -> Skeleton:
     """
     path = Path(path)
     skeleton = read_yaml(path, Skeleton, "a skeleton's file")
-    stem = "".join(filter(str.isalnum, path.stem.lower()))
-    skeleton.source = skeleton.source or stem
+    skeleton.source = skeleton.source or plain_source(path.stem)
     try:
         _check(skeleton)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return skeleton
+
+
+def plain_source(stem: str) -> str:
+    """Returns the name of a source for a file's: ``my_cat`` becomes ``mycat``."""
+    return "".join(filter(str.isalnum, stem.lower()))
 
 
 def _check(skeleton: Skeleton) -> None:
