@@ -14,8 +14,9 @@ from scipy.spatial.transform import Rotation
 Array = NDArray[np.float64]
 
 WALK = (0.25, 0.75, 0.0, 0.5)  # lateral sequence: RL, FL, RR, FR
-TROT = (0.5, 0.0, 0.0, 0.5)
+TROT = (0.5, 1.0, 0.0, 0.5)
 STAND = None
+CHANGE = 0.8
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,7 @@ def make_motion(
         animal: the animal.
         seconds: how long.
         schedule: start time in s and gait of each part, STAND for standing; changes
-            take half a second around their time. Without it, the animal's gait.
+            take CHANGE s around their time. Without it, the animal's gait.
     """
     time = np.arange(round(seconds * animal.fps) + 1) / animal.fps
     parts = schedule or ((0.0, animal.gait),)
@@ -166,8 +167,8 @@ def make_motion(
     on = [float(gait is not None) for _, gait in parts]
 
     def over(values: list[float]) -> Array:
-        at = np.stack((starts - 0.25, starts + 0.25), -1).ravel()[1:]
-        return np.interp(time, at, np.repeat(values, 2)[1:])
+        at = np.stack((starts - CHANGE / 2, starts + CHANGE / 2), -1).ravel()[1:]
+        return np.interp(time, at, np.repeat(values, 2)[:-1])
 
     go = over(on)
     clock = np.cumsum(go * over([1 / g.period for g in gaits])) / animal.fps
@@ -221,7 +222,7 @@ def write_bvh(
     }
     turns = {name: Rotation.concatenate([turn] * count) for name in offsets}
     reach = animal.height - drop
-    link = 0.62 * reach
+    link = 0.66 * reach
     for leg, name in enumerate(("FL", "FR", "RL", "RR")):
         base = truth.withers if leg < 2 else truth.hip
         side = (1, -1)[leg % 2]

@@ -12,6 +12,7 @@ from loco_drake.cli.output import print_table, write_figure, write_json
 from loco_drake.common.errors import InputError
 
 if TYPE_CHECKING:
+    from loco_drake.retargeting.cuts import Cut
     from loco_drake.retargeting.inspection import ClipSummary
 
 
@@ -92,17 +93,23 @@ class DataInspect:
             return self._inspect_skeleton()
         from loco_drake.datasets.registry import read_clip
         from loco_drake.datasets.skeleton import load_source
+        from loco_drake.retargeting.cuts import propose_cuts
         from loco_drake.retargeting.inspection import clip_figure, summarize
 
         source = load_source(self.source)
         clip = read_clip(source, self.file, "unknown", self.start, self.end, self.fps)
         summary, contacts = summarize(clip)
+        cuts = propose_cuts(clip)
         stretch = f"{self.file.stem}-{clip.provenance['frames']}"
         out = self.out or Path(f"{stretch}.png")
-        write_figure(clip_figure(clip, contacts, stretch), out, dpi=100)
+        write_figure(clip_figure(clip, contacts, cuts, stretch), out, dpi=100)
         licence = clip.provenance["licence"]
-        write_json(self.json, {**asdict(summary), "licence": licence})
+        proposed = [asdict(cut) for cut in cuts]
+        figures = {**asdict(summary), "cuts": proposed, "licence": licence}
+        write_json(self.json, figures)
         print_table(f"{stretch}, drawn in {out}", ["", "value"], _rows(summary))
+        if len(cuts) > 1:
+            _print_cuts(cuts)
         return 0
 
     def _inspect_skeleton(self) -> int:
@@ -117,10 +124,36 @@ class DataInspect:
         return 0
 
 
-def _rows(summary: "ClipSummary") -> list[list[str]]:
-    def text(value: float | None) -> str:
-        return "-" if value is None else f"{value:.3g}"
+def _print_cuts(cuts: "list[Cut]") -> None:
+    rows = [
+        [
+            f"{cut.start}-{cut.end}",
+            cut.guess,
+            f"{cut.seconds:.1f}",
+            f"{cut.speed_mean_mps:.2f}",
+            _text(cut.stride_period_s),
+        ]
+        for cut in cuts
+    ]
+    print_table(
+        "Proposed cuts", ["frames", "like", "seconds", "m/s", "stride, s"], rows
+    )
+    kinds = ", ".join(dict.fromkeys(cut.guess for cut in cuts))
+    longest = max(
+        cuts, key=lambda cut: cut.seconds if cut.stride_period_s is not None else 0.0
+    )
+    print(
+        f"It holds {kinds}, and begins with {cuts[0].seconds:.1f} s of "
+        f"{cuts[0].guess}: cut it, such as with --start {longest.start} --end "
+        f"{longest.end}."
+    )
 
+
+def _text(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
+
+
+def _rows(summary: "ClipSummary") -> list[list[str]]:
     rows = [["frames", str(summary.frames)]]
     names = {
         "fps": "frames/s",
@@ -129,8 +162,8 @@ def _rows(summary: "ClipSummary") -> list[list[str]]:
         "speed_mean_mps": "mean speed, m/s",
         "stride_period_s": "stride period, s",
     }
-    rows += [[name, text(getattr(summary, key))] for key, name in names.items()]
+    rows += [[name, _text(getattr(summary, key))] for key, name in names.items()]
     for key, name in (("duty_factor", "duty factor"), ("phase", "lag behind RL")):
-        values = "  ".join(text(value) for value in getattr(summary, key) or (None,))
+        values = "  ".join(_text(value) for value in getattr(summary, key) or (None,))
         rows.append([f"{name}: FL FR RL RR", values])
     return rows

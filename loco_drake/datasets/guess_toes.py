@@ -190,7 +190,8 @@ def _limbs(
                 apart = np.linalg.norm(points[:, a] - points[:, b], axis=-1)
                 low, middle, high = np.percentile(apart, (5, 50, 95))
                 near = _LIMB if moves else _LIMB_STANDING
-                found[a, b] = middle < near * size and high - low < _RIGID * size
+                rigid = middle < near * size and high - low < _RIGID * size
+                found[a, b] = rigid or (moves and high < _PAW * size)
     return found
 
 

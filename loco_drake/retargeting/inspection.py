@@ -1,5 +1,6 @@
 """Plots and figures of one recording, to check its label."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from loco_drake.models.legs import LEGS
 from loco_drake.motion.gait_timing import clip_track, gait_timing
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.retargeting.contacts import detect_contacts, stance_height
+from loco_drake.retargeting.cuts import Cut
 from loco_drake.retargeting.scaling import load_config
 
 
@@ -61,8 +63,13 @@ def trunk_speed(clip: KeypointClip) -> Array:
     return speed
 
 
-def clip_figure(clip: KeypointClip, contacts: Bools, title: str) -> Figure:
-    """Returns a figure of toe heights, gait diagram and speeds over time."""
+def clip_figure(
+    clip: KeypointClip, contacts: Bools, cuts: Sequence[Cut], title: str
+) -> Figure:
+    """Returns a figure of toe heights, gait diagram and speeds over time.
+
+    Proposed cuts are marked and labelled in the gait diagram.
+    """
     figure = Figure(figsize=(12, 8), layout="constrained")
     heights, gait, speed = figure.subplots(3, 1, sharex=True)
     time = np.arange(len(clip)) / clip.fps
@@ -78,10 +85,16 @@ def clip_figure(clip: KeypointClip, contacts: Bools, title: str) -> Figure:
         toe_speed = np.hypot(toe_velocity[:, leg, 0], toe_velocity[:, leg, 1])
         speed.plot(time, toe_speed, color=color, lw=0.7)
     speed.plot(time, trunk_speed(clip), color="k", lw=2, label="trunk")
+    first = cuts[0].start if cuts else 0
+    for cut in cuts if len(cuts) > 1 else []:
+        start, middle = cut.start - first, (cut.start + cut.end) / 2 - first
+        for axes in (heights, gait, speed) if start else ():
+            axes.axvline(start / clip.fps, color="k", lw=0.8, ls=":")
+        gait.text(middle / clip.fps, 4.55, cut.guess, ha="center", fontsize="small")
     heights.axhline(0.0, color="0.6", lw=0.8)
     heights.set(ylabel="toe height [m]", title=title)
     heights.legend(loc="upper right", ncols=4)
-    gait.set(ylabel="on the ground", ylim=(0.4, 4.6))
+    gait.set(ylabel="on the ground", ylim=(0.4, 4.9))
     gait.set_yticks(range(4, 0, -1), LEGS)
     speed.set(ylabel="speed [m/s]", xlabel="time [s]")
     speed.legend(loc="upper right")
