@@ -4,7 +4,7 @@ Two skeletons that have nothing in common with the dog's but four legs: a cat in
 with Z up, and a horse in inches with Y up, another root and order of joints.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +45,6 @@ class Animal:
     channels: str  # of rotations, such as ZXY
     fps: float
     named_ends: bool  # whether toes are joints, or the ends of chains
-    extra: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 
 
 def _legs(front: str, rear: str, order: tuple[str, ...]) -> list[tuple[str, str]]:
@@ -134,6 +133,12 @@ HORSE = Animal(
     fps=60.0,
     named_ends=False,
 )
+
+
+# The file that docs/own_animal.md walks through.
+EXAMPLE = replace(CAT, fps=50.0)
+FAST = Gait(1.1, 0.42, 0.45, TROT)
+SCHEDULE = ((0.0, STAND), (1.6, CAT.gait), (4.6, FAST))
 
 
 @dataclass(frozen=True)
@@ -250,7 +255,9 @@ def write_bvh(
         columns.append(Rotation.from_matrix(R).as_euler(animal.channels, degrees=True))
     rows = np.concatenate(columns, axis=1)
     text += ["MOTION", f"Frames: {count}", f"Frame Time: {1 / animal.fps:.6f}"]
-    text += [" ".join(f"{value:.6f}" for value in row) for row in rows]
+    # To .01 mm of a metre, and to a thousandth of a degree.
+    rows[:, :3], rows[:, 3:] = rows[:, :3].round(5), rows[:, 3:].round(3)
+    text += [" ".join(f"{value + 0.0:.8g}" for value in row) for row in rows]
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("\n".join(text) + "\n")
     return truth
@@ -300,9 +307,8 @@ def _hierarchy(animal: Animal, offsets: dict[str, Array]) -> list[str]:
             visit(child, depth + 1)
         if not children.get(node):
             # As exporters write it: the end of a chain is where its joint is.
-            x, y, z = animal.R_FW @ np.array([0.0, 0.0, 0.0])
             lines.extend((f"{pad}  End Site", f"{pad}  {{"))
-            lines.extend((f"{pad}    OFFSET {x} {y} {z}", f"{pad}  }}"))
+            lines.extend((f"{pad}    OFFSET 0 0 0", f"{pad}  }}"))
         lines.append(f"{pad}}}")
 
     visit(animal.tree[0][0], 0)

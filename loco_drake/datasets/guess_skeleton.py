@@ -26,6 +26,8 @@ from loco_drake.motion.gait_timing import GaitTiming, Track, gait_timing
 _PERIOD = (0.157, 1.415)
 # Units that put the height within this factor of that are all possible.
 _FACTOR = 2.6
+# A clip of several gaits has a rhythm in parts only: halves, thirds, ...
+_PARTS = (1, 2, 3, 4, 6, 9)
 # Heights of trunks, m, for a clip without strides.
 _HEIGHTS = (0.1, 1.8)
 # A trunk that moves along itself by less than this share of its path goes elsewhere.
@@ -77,7 +79,7 @@ def guess_skeleton(named: NamedPoints, fps: float | None = None) -> Guess:
     points = pick(upright, skeleton.points)
     points[..., 2] -= np.percentile(points[:, 2:, 2], 10)
     track, height = _track(points, toes.moving, rate or 1.0)
-    timing = gait_timing(track) if rate else None
+    timing = _rhythm(track) if rate else None
     skeleton.units = _unit(height, timing, doubts)
     if rate is None:
         doubts.append("The file does not tell its rate: add it as fps.")
@@ -185,6 +187,26 @@ def _track(points: Array, moving: Bools, rate: float) -> tuple[Track, float]:
     )
     yaw = np.arctan2(spine[:, 1], spine[:, 0])
     return Track(rate, middle[:, :2], yaw, soles, height), height
+
+
+def _rhythm(track: Track) -> GaitTiming | None:
+    """Returns the gait timing of a track, or of the longest part that has a rhythm."""
+    frames = len(track.yaw)
+    for parts in _PARTS:
+        length = frames // parts
+        for start in range(0, frames - length + 1, max(length // 2, 1)):
+            part = slice(start, start + length)
+            timing = gait_timing(
+                replace(
+                    track,
+                    trunk=track.trunk[part],
+                    yaw=track.yaw[part],
+                    soles=track.soles[part],
+                )
+            )
+            if timing is not None:
+                return timing
+    return None
 
 
 def _unit(height: float, timing: GaitTiming | None, doubts: list[str]) -> str:

@@ -64,7 +64,9 @@ def guess_toes(named: NamedPoints) -> Toes:
     pace = np.linalg.norm(np.gradient(centre, axis=0), axis=-1)
     # Animals may sit and lie in between, when any point is still.
     on: Bools = pace > _MOVES * np.percentile(pace, 90) if travels else pace >= 0
-    still = np.percentile(speed[on], _SLOW, axis=0) / pace[on].mean() * travels
+    still = np.zeros(len(named.names))
+    if travels:
+        still = np.percentile(speed[on], _SLOW, axis=0) / pace[on].mean()
     candidates = [k for k in _ends(named) if usable[k]]
     limbs = _limbs(named, points, candidates, size, travels)
     choices = []
@@ -119,7 +121,7 @@ def _over_ground(points: Array, toes: list[int], size: float) -> tuple[Array, bo
     It is as fast as low toes are in the median.
     """
     feet = points[1:, toes]
-    low = feet[..., 2] < np.percentile(feet[..., 2], 2 * _LOW, axis=0)
+    low = feet[..., 2] <= np.percentile(feet[..., 2], 2 * _LOW, axis=0)
     steps = np.diff(points[:, toes], axis=0)[..., :2]
     belt = np.median(steps[low], axis=0)
     way = np.arange(len(points))[:, None] * belt
