@@ -35,13 +35,13 @@ def inspect_skeleton(file: Path, fps: float | None, out: Path | None) -> dict[st
         if fps is not None:
             check_rate(fps)
         print_lines(_contents(file, named))
-        guess = guess_skeleton(named, fps)
+        guess = _guess(named, fps)
     except InputError as error:
         known = str(file) in str(error)
         raise InputError(str(error) if known else f"{file}: {error}") from None
     guess.skeleton.source = plain_source(out.stem) if out is not None else "animal"
     text = _text(guess)
-    print_lines(["", *_measured(named, guess), "", *_marked(named, guess), ""])
+    print_lines(["", *_measured(guess), "", *_marked(named, guess.joints), ""])
     if out is None:
         print_lines(text.splitlines())
     else:
@@ -73,7 +73,7 @@ def _contents(file: Path, named: NamedPoints) -> list[str]:
     ]
 
 
-def _measured(named: NamedPoints, guess: Guess) -> list[str]:
+def _measured(guess: Guess) -> list[str]:
     """Returns lines on the measured conventions."""
     skeleton, unit = guess.skeleton, guess.skeleton.metres
     lines = [
@@ -92,10 +92,19 @@ def _measured(named: NamedPoints, guess: Guess) -> list[str]:
     return lines
 
 
-def _marked(named: NamedPoints, guess: Guess) -> list[str]:
+def _guess(named: NamedPoints, fps: float | None) -> Guess:
+    """Returns the guess; prints the joints before it fails, to name them by hand."""
+    try:
+        return guess_skeleton(named, fps)
+    except InputError:
+        print_lines(["", *_marked(named, {})])
+        raise
+
+
+def _marked(named: NamedPoints, joints: dict[str, tuple[int, ...]]) -> list[str]:
     """Returns the joints, each below the one it hangs on, with what they may be."""
     what: dict[int, list[str]] = {}
-    for name, indices in guess.joints.items():
+    for name, indices in joints.items():
         for k in indices:
             what.setdefault(k, []).append(name)
     lines = []

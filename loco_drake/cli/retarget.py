@@ -94,9 +94,8 @@ class Retarget:
             check_choice("robot to steer", robot.name, ROBOTS)
         if self.ground:
             check_choice("robot to ground", robot.name, ROBOTS)
-        if self.source is not None:
-            self.source = load_source(self.source)
-        segments, split = self._segments()
+        source = None if self.source is None else load_source(self.source)
+        segments, split = self._segments(source)
         variant = Variant(mirror=self.mirror, froude=self.froude, ground=self.ground)
         out = self.out or Path("motions") / f"{robot.name}{variant.suffix}"
         done = retarget_segments(segments, robot, out, split, self.workers, variant)
@@ -167,30 +166,30 @@ class Retarget:
         )
         print_table(title, ["label", TRAIN, VALIDATION], rows)
 
-    def _segments(self) -> "tuple[list[Segment], Split | None]":
+    def _segments(self, source: str | None) -> "tuple[list[Segment], Split | None]":
         """Returns what to retarget, and the split of the data folder it is from."""
         from loco_drake.datasets import segments
         from loco_drake.datasets.registry import data_dir
         from loco_drake.datasets.split import Split
 
         if self.file is not None:
-            return [self._segment_of_file(self.file)], None
+            return [self._segment_of_file(self.file, source)], None
         if (self.start, self.end, self.fps) != (None, None, None):
             raise InputError("--start, --end and --fps need a FILE.")
         table = segments.one_format(segments.read_segments(data_dir(self.data_dir)))
         split = Split(table, self.seed)
-        return segments.select_segments(table, self.source, self.gait), split
+        return segments.select_segments(table, source, self.gait), split
 
-    def _segment_of_file(self, file: Path) -> "Segment":
+    def _segment_of_file(self, file: Path, source: str | None) -> "Segment":
         from loco_drake.datasets.registry import read_clip
         from loco_drake.datasets.segments import Segment
 
-        if self.source is None or len(self.gait) != 1:
+        if source is None or len(self.gait) != 1:
             raise InputError("A FILE needs its --source and one --gait.")
         (gait,) = self.gait
-        clip = read_clip(self.source, file, gait, self.start, self.end, self.fps)
+        clip = read_clip(source, file, gait, self.start, self.end, self.fps)
         start, end = map(int, clip.provenance["frames"].split("-"))
-        return Segment(self.source, file, gait, start, end, clip.fps)
+        return Segment(source, file, gait, start, end, clip.fps)
 
 
 def _figures(outcome: "Outcome") -> dict[str, object]:

@@ -6,6 +6,7 @@ The up axis is the one along which that is so and the other points are above the
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -179,21 +180,19 @@ def _limbs(
     named: NamedPoints, points: Array, candidates: list[int], size: float, moves: bool
 ) -> dict[tuple[int, int], bool]:
     """Returns of each pair of candidates whether they are of one limb."""
-    found = {}
-    for a in candidates:
-        for b in candidates:
-            if named.is_tree:
-                far = max(
-                    chain_length(named, points, k, common_joint(named, (a, b)))
-                    for k in (a, b)
-                )
-                found[a, b] = far < _PAW * size
-            else:
-                apart = np.linalg.norm(points[:, a] - points[:, b], axis=-1)
-                low, middle, high = np.percentile(apart, (5, 50, 95))
-                near = _LIMB if moves else _LIMB_STANDING
-                rigid = middle < near * size and high - low < _RIGID * size
-                found[a, b] = rigid or (moves and high < _PAW * size)
+    found = {(k, k): True for k in candidates}
+    for a, b in combinations(candidates, 2):
+        if named.is_tree:
+            top = common_joint(named, (a, b))
+            far = max(chain_length(named, points, k, top) for k in (a, b))
+            one = far < _PAW * size
+        else:
+            apart = np.linalg.norm(points[:, a] - points[:, b], axis=-1)
+            low, middle, high = np.percentile(apart, (5, 50, 95))
+            near = _LIMB if moves else _LIMB_STANDING
+            rigid = middle < near * size and high - low < _RIGID * size
+            one = bool(rigid or (moves and high < _PAW * size))
+        found[a, b] = found[b, a] = one
     return found
 
 

@@ -60,7 +60,8 @@ class NamedPoints:
             raise InputError(
                 f"it has {len(found)} joints {quoted(name)}; name one of {paths}."
             )
-        raise InputError(f"it has no joint {quoted(name)}, but {self.listing()}.")
+        kind = "joint" if self.is_tree else "point"
+        raise InputError(f"it has no {kind} {quoted(name)}, but {self.listing()}.")
 
     def path(self, index: int) -> str:
         """Returns the shortest path by which :meth:`find` finds the point."""

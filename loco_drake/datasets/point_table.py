@@ -166,15 +166,17 @@ def _numbers(rows: list[list[str]], first: int, width: int) -> Array:
 def _named_points(header: list[list[str]]) -> dict[str, tuple[int, int, int]]:
     """Returns the columns of each point that a header names.
 
-    Its last row has names with axes, or the axes of names in a row above.
+    One of its rows has names with axes, or the axes of names in a row above.
     """
-    found = [_group([_suffixed(cell) for cell in row]) for row in header[-1:]]
-    axes = [_AXIS.fullmatch(cell) for cell in header[-1]]
-    for names in header[:-1]:
-        cells = [
-            (names[k], axis[1].lower()) if axis else None for k, axis in enumerate(axes)
-        ]
-        found.append(_group(cells))
+    found: list[dict[str, tuple[int, int, int]]] = []
+    for row, cells in enumerate(header):
+        found.append(_group([_suffixed(cell) for cell in cells]))
+        axes = [_AXIS.fullmatch(cell) for cell in cells]
+        for names in header[:row]:
+            pairs = zip(names, axes, strict=True)
+            found.append(
+                _group([(k, axis[1].lower()) if axis else None for k, axis in pairs])
+            )
     return max(found, key=len)
 
 

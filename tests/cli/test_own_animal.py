@@ -162,9 +162,11 @@ def test_the_documentation_shows_the_example_file_and_the_cuts(tmp_path, capsys)
     picture = str(tmp_path / "a.png")
     assert main(["data", "inspect", bvh, "--source", str(file), "--out", picture]) == 0
     printed |= {" ".join(line.split()) for line in capsys.readouterr().out.splitlines()}
-    shown = re.findall(r"^```\n(.*?)^```$", page, re.M | re.S)
-    lines = {" ".join(line.split()) for text in shown for line in text.splitlines()}
-    assert {line for line in lines if line[:1] not in ("─", ".")} <= printed
+    blocks = re.findall(r"^```(\w*)\n(.*?)^```$", page, re.M | re.S)
+    shown = "".join(text for language, text in blocks if not language)
+    lines = {" ".join(line.split()) for line in shown.splitlines()}
+    assert len(lines) > 10
+    assert {line for line in lines if line[0] not in "─."} <= printed
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.datasets.named_points import read_points
 from loco_drake.datasets.registry import DATASETS, read_clip
 from loco_drake.datasets.skeleton import load_source, read_skeleton
+from loco_drake.retargeting.scaling import load_config
 from tests.synthetic_animals import CAT, HORSE, make_motion, write_bvh
 
 CAT_YAML = """
@@ -124,7 +125,16 @@ def three_rows(names, rows):
     return "\n".join([*head, axes, *(f"{k},{row}" for k, row in enumerate(rows))])
 
 
-@pytest.mark.parametrize("form", [one_row, two_rows, three_rows])
+def with_units(names, rows):
+    """Below the axes the unit of each column, and a rate in a line of its own."""
+    head = ["Trajectories", "100", ",," + ",,,".join(f"Cat:{n}" for n in names) + ",,"]
+    axes = ["Frame,Sub Frame" + ",X,Y,Z" * len(names), "," + ",mm" * 3 * len(names)]
+    return "\n".join(
+        [*head, *axes, *(f"{k + 1},0,{row}" for k, row in enumerate(rows))]
+    )
+
+
+@pytest.mark.parametrize("form", [one_row, two_rows, three_rows, with_units])
 @pytest.mark.parametrize("gap", [False, True])
 def test_table_under_any_header_reads_as_what_it_was_made_of(form, gap, tmp_path):
     truth = make_motion(CAT)
@@ -209,6 +219,23 @@ def test_what_is_wrong_with_a_skeleton_is_told(old, new, reason, tmp_path):
         )
 
 
+def test_retargeting_is_configured_in_the_same_file(tmp_path):
+    more = "retargeting: {hip_spread: 0.17, contact: {land_height: 0.03}}\n"
+    config = load_config(load(tmp_path / "a.yaml", CAT_YAML + more))
+    assert (config.hip_spread, config.contact.land_height) == (0.17, 0.03)
+    assert config.front_hip == 0.0
+    for wrong, reason in (
+        (
+            "spread: 1",
+            "retargeting: it has the unknown field 'spread'; there are base_",
+        ),
+        ("swing_height: 0", "retargeting: swing_height must be above 0, not 0"),
+    ):
+        source = load(tmp_path / "a.yaml", f"{CAT_YAML}retargeting: {{{wrong}}}\n")
+        with pytest.raises(InputError, match=reason):
+            load_config(source)
+
+
 def test_table_without_rate_or_of_other_points_is_refused(tmp_path):
     header = "frame,tail_x,tail_y,tail_z"
     rows = "\n".join(f"{k},1.5,2.5,3.5" for k in range(9))
@@ -216,7 +243,7 @@ def test_table_without_rate_or_of_other_points_is_refused(tmp_path):
     source = load(tmp_path / "a.yaml", TABLE_YAML)
     with pytest.raises(InputError, match=r"rate is not in the file; give .* as fps"):
         read_clip(source, tmp_path / "a.csv", "walk")
-    with pytest.raises(InputError, match="no joint 'withers', but tail"):
+    with pytest.raises(InputError, match="no point 'withers', but tail"):
         read_clip(source, tmp_path / "a.csv", "walk", fps=50)
     (tmp_path / "a.csv").write_text("a,b\n1.5,2.5\n3.5,4.5\n")
     with pytest.raises(InputError, match=r"no points .*, but a, b; name those"):
