@@ -81,8 +81,8 @@ class DataInspect:
     fps: float | None = None
     # Print joints, rate, axes and unit, and propose a skeleton's YAML file.
     skeleton: bool = False
-    # PNG file to write. Default: the name of the recording, in the current folder. With
-    # --skeleton the YAML file; default: none, it is printed.
+    # PNG file to write, or YAML file with --skeleton. Default: a PNG file in the
+    # current folder, named like the recording; no YAML file, only its text.
     out: Path | None = None
     json: Json = None
     seed: UnusedSeed = 0

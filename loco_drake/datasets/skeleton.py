@@ -24,6 +24,7 @@ import numpy as np
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, quoted
 from loco_drake.common.typed_yaml import read_yaml
+from loco_drake.datasets import registry
 from loco_drake.datasets.conventions import turn_up, with_z_up
 from loco_drake.datasets.gaps import LONGEST_GAP, mend_gaps, usable_stretch
 from loco_drake.datasets.named_points import NamedPoints, read_points
@@ -32,7 +33,7 @@ from loco_drake.datasets.recording import (
     check_frames,
     check_rate,
 )
-from loco_drake.datasets.registry import DATASETS, Dataset, register_dataset
+from loco_drake.datasets.registry import Dataset, get_dataset, register_dataset
 from loco_drake.models.legs import LEGS
 
 SUFFIXES = (".yaml", ".yml")
@@ -141,11 +142,11 @@ def load_source(definition: str) -> str:
     """
     if Path(definition).suffix in SUFFIXES:
         return load_sources([Path(definition)])[0]
-    if definition not in DATASETS:
-        raise InputError(
-            f"Unknown source {quoted(definition)}; the choices are "
-            f"{', '.join(DATASETS)}, or a skeleton's YAML file."
-        )
+    try:
+        get_dataset(definition)
+    except InputError as error:
+        choices = str(error).removesuffix(".")
+        raise InputError(f"{choices}, or a skeleton's YAML file.") from None
     return definition
 
 
@@ -177,7 +178,7 @@ def load_sources(paths: Iterable[Path]) -> list[str]:
 
 def loaded_files() -> tuple[Path, ...]:
     """Returns the YAML files of the sources registered here, for worker processes."""
-    files = (dataset.definition for dataset in DATASETS.values())
+    files = (dataset.definition for dataset in registry.DATASETS.values())
     return tuple(file for file in files if file is not None)
 
 
