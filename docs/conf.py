@@ -1,7 +1,7 @@
 """Configuration of Sphinx for the documentation site.
 
-    pip install ".[docs]"
-    python -m sphinx -W docs site
+pip install ".[docs]"
+python -m sphinx -W docs site
 """
 
 import os

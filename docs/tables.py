@@ -2,8 +2,8 @@
 
     python docs/tables.py
 
-A table is found by the line before it. ``tests/test_docs.py`` checks that the pages show
-the results.
+A table is found by the line before it. ``tests/test_docs.py`` checks that the pages
+show the results.
 """
 
 import re
@@ -80,7 +80,12 @@ def level_rows(results: dict[str, Any]) -> Rows:
 _TABLES: tuple[tuple[str, str, str, Callable[[dict[str, Any]], Rows]], ...] = (
     ("tracking.md", "tracking-{robot}-generated", "{title}:", tracking_rows),
     ("steering.md", "steering-{robot}", "{title}:", steering_rows),
-    ("robustness.md", "robustness-{robot}", "{title}, by gait; [^\n]+:", disturbed_rows),
+    (
+        "robustness.md",
+        "robustness-{robot}",
+        "{title}, by gait; [^\n]+:",
+        disturbed_rows,
+    ),
     ("robustness.md", "robustness-{robot}", "{title}, all [^\n]+:", level_rows),
 )
 

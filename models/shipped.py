@@ -37,7 +37,8 @@ def weights_in(folder: Path) -> dict[str, Path]:
                 f"Several runs in {str(folder)!r} have a {kind}: {places}; name one "
                 f"with --{kind}, or the folder of a run."
             )
-        found |= {kind: file for file in files}
+        if files:
+            found[kind] = files[0]
     if not found:
         raise InputError(
             f"There are no weights in {str(folder)!r}, nor in the runs in it: neither "

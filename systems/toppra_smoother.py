@@ -9,8 +9,8 @@ from loco_drake.control.plan import UPDATE_PERIOD, standing_plan
 from loco_drake.control.retiming import (
     PathLimits,
     Progress,
-    no_progress,
     fall_limit,
+    no_progress,
     path_limits,
     smooth_chunk,
 )

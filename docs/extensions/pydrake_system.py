@@ -1,12 +1,12 @@
 """Renders the ports of a system, as Drake's docstrings declare them, as tables.
 
-    .. pydrake_system::
+.. pydrake_system::
 
-        name: Steering
-        input_ports:
-        - plan: abstract, Plan
-        output_ports:
-        - followed: vector (3,), the command as far as it is followed; m/s, rad/s
+name: Steering
+input_ports:
+- plan: abstract, Plan
+output_ports:
+- followed: vector (3,), the command as far as it is followed; m/s, rad/s
 """
 
 from typing import Any

@@ -305,8 +305,8 @@ def _header(scenario: "Scenario", recorded: "DriveFile | None") -> dict[str, Any
         # Earlier drives tell the policy's only.
         if recorded and recorded.header.get(f"{kind}_sha256", weights) != weights:
             raise InputError(
-                f"The weights at {path} are not those of the recorded drive; name these "
-                f"with --{kind}."
+                f"The weights at {path} are not those of the recorded drive; name "
+                f"these with --{kind}."
             )
         hashes[f"{kind}_sha256"] = weights
     return {

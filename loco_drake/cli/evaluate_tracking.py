@@ -66,7 +66,9 @@ class EvaluateTracking(SimulatedEvaluation):
         from loco_drake.generation.generate import check_duration
 
         super().check()
-        check_choice("reference", self.reference, ("generated", "retargeted", "grounded"))
+        check_choice(
+            "reference", self.reference, ("generated", "retargeted", "grounded")
+        )
         check_choice("simulator", self.simulator, ("drake", "mujoco"))
         check_duration(self.duration)
         if self.pushes:

@@ -41,7 +41,12 @@ _COMMANDS = {
     "report": "write one HTML page of all results",
 }
 # Of most commands the module is called like them, "train_tracker".
-_MODULES = {"data list": "data", "data fetch": "fetch", "data inspect": "data", "runs list": "runs"}
+_MODULES = {
+    "data list": "data",
+    "data fetch": "fetch",
+    "data inspect": "data",
+    "runs list": "runs",
+}
 _HELP = ("-h", "--help")
 # Options that name an output. Whether it is writable is checked before the work.
 _OUTPUTS = ("json", "html", "out", "figures", "record", "plans")

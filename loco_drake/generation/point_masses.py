@@ -1,8 +1,8 @@
 """Differentiable momentum of several robots in one batch, for training.
 
 A rigid body of mass m whose second moments of mass along the principal axes through its
-centre are s_i moves like four points of m / 4 each, at the alternate corners of a box of
-plus and minus sqrt(s_i / m): mass, centre and inertia are the same. Points need no
+centre are s_i moves like four points of m / 4 each, at the alternate corners of a box
+of plus and minus sqrt(s_i / m): mass, centre and inertia are the same. Points need no
 angular velocities.
 """
 
@@ -47,7 +47,9 @@ class PointMasses:
         self._radius = table(radii)
         self._trunk = table([points[0] for points, _ in bodies])  # (R, 4, 3)
         # Of hips, thighs and calves in their frames, (R, 3, 4, 4, 3).
-        legs = [points[1:].reshape(4, 3, _POINTS, 3).swapaxes(0, 1) for points, _ in bodies]
+        legs = [
+            points[1:].reshape(4, 3, _POINTS, 3).swapaxes(0, 1) for points, _ in bodies
+        ]
         self._legs = table(legs)
         # Shares of the robot's mass, in the order of :meth:`positions`.
         shares = []
@@ -62,9 +64,7 @@ class PointMasses:
         hip, thigh, calf = joints.reshape(*joints.shape[:-1], 4, 3).unbind(-1)
         zero = torch.zeros_like(hip)
         # Origins of the frames in the frame of the hip, which turns about x.
-        p_thigh = torch.stack(
-            (zero, zero + self._offset[robot][:, None], zero), dim=-1
-        )
+        p_thigh = torch.stack((zero, zero + self._offset[robot][:, None], zero), dim=-1)
         l1 = self._thigh[robot, None, None]
         down = torch.stack((-l1 * thigh.sin(), zero, -l1 * thigh.cos()), dim=-1)
         links = self._legs[robot][:, None]  # (B, 1, 3, 4, 4, 3)
@@ -82,7 +82,9 @@ class PointMasses:
         roll, pitch = features[..., None, ft.ROLL_PITCH].unbind(-1)  # (B, T, 1)
         points = _about_y(_about_x(points, roll), pitch)
         height = features[..., ft.HEIGHT] * self._height[robot, None, None]
-        lift = torch.cat((torch.zeros_like(height), torch.zeros_like(height), height), -1)
+        lift = torch.cat(
+            (torch.zeros_like(height), torch.zeros_like(height), height), -1
+        )
         return points + lift[:, :, None]
 
     def wrench(self, features: Tensor, robot: Tensor) -> Tensor:

@@ -159,9 +159,7 @@ def train_tokenizer(
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         target, robot, label = windows(random, BATCH)
-        losses = tokenizer_losses(
-            learning, toes, masses, scales(label), target, robot
-        )
+        losses = tokenizer_losses(learning, toes, masses, scales(label), target, robot)
         weighted = (WEIGHTS[name] * loss for name, loss in losses.items())
         total = sum(weighted, torch.zeros(()))
         return total, {name: loss.item() for name, loss in losses.items()}

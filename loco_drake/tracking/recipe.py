@@ -121,7 +121,9 @@ class Before:
             InputError: if there is none, it is unsound, or has no such stage.
         """
         recipe = read_recipe(self.recipe)
-        check_bounds("The stages of the recipe before", self.stages, 1, len(recipe.stages))
+        check_bounds(
+            "The stages of the recipe before", self.stages, 1, len(recipe.stages)
+        )
         return replace(recipe, stages=recipe.stages[: self.stages])
 
 

@@ -84,9 +84,7 @@ def run_recipe(
         if resume:
             run.check_continues(read_recipe(folder / RECIPE))
         run.begin(resume=resume)
-        interrupted = not (
-            run.do_before() and run.make_references() and run.train()
-        )
+        interrupted = not (run.do_before() and run.make_references() and run.train())
         if not interrupted:
             last = run.stage_folder(len(recipe.stages) - 1)
             halve_policy(last / POLICY, folder / POLICY)
@@ -304,7 +302,10 @@ class _Run:
         return True
 
     def _steps_before(self, index: int) -> int:
-        folder, own = self.folder, replace(self.recipe, stages=self.recipe.stages[:index])
+        folder, own = (
+            self.folder,
+            replace(self.recipe, stages=self.recipe.stages[:index]),
+        )
         return int(recipe_curve(folder, own)["steps"])
 
 

@@ -16,7 +16,9 @@ from loco_drake.motion.motion_file import load_motion
 
 def smooth_motions(robot: Robot, motions: Iterable[Motion]) -> list[Plan]:
     """Returns motions as plans, re-timed by the smoother."""
-    limits = {grounded: path_limits(robot, fall_limit(grounded)) for grounded in (False, True)}
+    limits = {
+        grounded: path_limits(robot, fall_limit(grounded)) for grounded in (False, True)
+    }
     return [
         smooth_plan(robot, plan_from_motion(robot, motion), limits[motion.grounded])
         for motion in motions

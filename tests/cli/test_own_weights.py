@@ -85,10 +85,15 @@ def test_a_recorded_drive_knows_its_weights(runs, tmp_path, capsys):
     table.write_text("time,forward,sideways,yaw_rate\n0,0.3,0,0\n")
     line = ("--no-meshcat", "--duration", 0.4)
     orders = ("--gait", "dog-trot", "--commands", table)
-    run("drive", path, *line, *orders, "--weights", tmp_path / "runs", "--record", drive)
+    run(
+        "drive", path, *line, *orders, "--weights", tmp_path / "runs", "--record", drive
+    )
     again = run("drive", path, *line, "--replay", drive)
     assert again["identical"]
-    other, file = make_tiny_model(told=True).generator, "generator/generator.safetensors"
+    other, file = (
+        make_tiny_model(told=True).generator,
+        "generator/generator.safetensors",
+    )
     save_network(tmp_path / "runs" / file, "generator", other, {})
     assert main(["drive", "--no-meshcat", "--replay", str(drive)]) == 2
     error = capsys.readouterr().err

@@ -49,7 +49,7 @@ def test_weights_say_what_they_were_trained_on(weights):
 
 
 def test_a_generator_of_grounded_motion_says_so(weights, motions, tmp_path):
-    """If all motion to train on was made to obey physics, and so does what it writes."""
+    """If all motion to train on was made to obey physics; its own motion does, too."""
     for path in sorted(motions.glob("*.npz")):
         motion = load_motion(path)
         provenance = {**motion.provenance, "momentum_error": "0.01"}
