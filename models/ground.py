@@ -62,7 +62,7 @@ def AddGround(
         )
     if visual:
         floor = GeometryInstance(
-            RigidTransform([0.0, 0.0, FLOOR_Z]), _floor().Clone(), "floor"
+            RigidTransform([0.0, 0.0, FLOOR_Z]), floor_mesh(), "floor"
         )
         floor.set_illustration_properties(IllustrationProperties())
         plant.RegisterVisualGeometry(body, floor)
@@ -106,18 +106,21 @@ def SetGround(
         scene_graph.AssignRole(context, source, ground, properties, RoleAssign.kReplace)
 
 
-def _floor() -> Mesh:
+def floor_mesh() -> Mesh:
     """Returns the floor as a mesh, since other Drake shapes have one colour."""
     side = _TILES + 1
     obj = ["mtllib floor.mtl"]
     corners = [(k - _TILES / 2) * TILE for k in range(side)]
     obj += [f"v {x} {y} 0" for x in corners for y in corners]
+    # Meshcat needs no normal, but Drake's renderer does.
+    obj.append("vn 0 0 1")
     for parity, material in enumerate(("light", "dark")):
         obj.append(f"usemtl {material}")
         for i in range(_TILES):
             for j in range((i + parity) % 2, _TILES, 2):
                 k = i * side + j + 1
-                obj.append(f"f {k} {k + side} {k + side + 1} {k + 1}")
+                around = (k, k + side, k + side + 1, k + 1)
+                obj.append("f " + " ".join(f"{corner}//1" for corner in around))
     return Mesh(
         InMemoryMesh(
             mesh_file=MemoryFile("\n".join(obj), ".obj", "floor.obj"),

@@ -18,6 +18,7 @@ from loco_drake.common.files import check_writable
 _COMMANDS = {
     "simulate": "simulate a robot that performs a gait",
     "drive": "drive a robot with keys, sliders or a gamepad",
+    "play": "show Motion files in the browser or in a video",
     "generate": "generate motion and write Motion files",
     "retarget": "retarget recordings to a robot",
     "record": "record what a robot does with motion, to learn from",
@@ -49,7 +50,7 @@ _MODULES = {
 }
 _HELP = ("-h", "--help")
 # Options that name an output. Whether it is writable is checked before the work.
-_OUTPUTS = ("json", "html", "out", "figures", "record", "plans")
+_OUTPUTS = ("json", "html", "video", "out", "figures", "record", "plans")
 _ONE_FILE = ("report", "export", "data inspect")  # --out is a file
 # Libraries that Drake needs and a bare Debian or Ubuntu lacks.
 _LIBRARIES = "libx11-6 libsm6 libglib2.0-0"

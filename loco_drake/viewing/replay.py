@@ -1,0 +1,43 @@
+"""Scenes from the first to the last, as a page and as pictures."""
+
+from collections.abc import Iterator, Sequence
+
+from pydrake.geometry import Meshcat
+
+from loco_drake.evaluation.tracking import FRAMES_PER_SECOND
+from loco_drake.viewing.rendering import Camera, Picture
+from loco_drake.viewing.stage import Stage, viewpoint
+from loco_drake.viewing.takes import Scene
+
+
+def record(stage: Stage, meshcat: Meshcat) -> None:
+    """Records all scenes of a stage in its Meshcat, one after another."""
+    meshcat.SetCameraPose(*viewpoint(stage.scenes))
+    meshcat.StartRecording(frames_per_second=FRAMES_PER_SECOND)
+    for number, (scene, time) in enumerate(frame_times(stage.scenes, FRAMES_PER_SECOND)):
+        stage.draw(scene, time, at=number / FRAMES_PER_SECOND)
+    meshcat.StopRecording()
+    meshcat.PublishRecording()
+
+
+def pictures(scenes: Sequence[Scene], fps: float) -> Iterator[Picture]:
+    """Yields ``fps`` pictures a second of all scenes, one after another.
+
+    Raises:
+        OSError: if this machine cannot render.
+    """
+    stage = Stage(scenes, rendered=True)
+    camera = Camera(*viewpoint(scenes))
+    for scene, time in frame_times(scenes, fps):
+        stage.set_up(scene, time)
+        yield camera.take(stage.query_object)
+
+
+def frame_times(scenes: Sequence[Scene], fps: float) -> list[tuple[Scene, float]]:
+    """Returns scene and time in it, s, of each of the frames of all scenes."""
+    return [
+        (scene, k / fps)
+        for scene in scenes
+        # A tolerance, so that a duration of whole steps keeps its last frame.
+        for k in range(int(scene.duration * fps + 1e-6) + 1)
+    ]

@@ -1,0 +1,134 @@
+"""What is shown: one robot's motion is a take, takes beside each other are a scene."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from loco_drake.common.arrays import Array
+from loco_drake.common.rotations import (
+    quat_multiply,
+    quat_rotate,
+    yaw_of,
+    yaw_quat,
+)
+from loco_drake.control.state import ORIENTATION, POSITION
+from loco_drake.models.quadruped import Quadruped
+from loco_drake.motion.keypoints import KeypointClip
+from loco_drake.motion.motion import Motion
+from loco_drake.retargeting.scaling import resample
+
+# Width of the lane that a robot has for itself, over its height.
+_LANE = 2.2
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """What one robot is shown to do, and six points that are shown with it.
+
+    Points are the toes FL, FR, RL, RR, the withers and the hip.
+    """
+
+    title: str  # what the page calls it
+    robot: Quadruped
+    fps: float  # frames/s
+    q: Array  # [q_WB as w x y z, p_WB, joints], m and rad, shape (T, 7 + J)
+    points: Array | None = None  # p_WK, m, shape (T, 6, 3)
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first frame to the last."""
+        return (len(self) - 1) / self.fps
+
+    def index(self, time: float) -> int:
+        """Returns the frame nearest to ``time`` in s, the last one if it is over."""
+        return min(max(round(time * self.fps), 0), len(self) - 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Takes that are shown at the same time, side by side."""
+
+    takes: tuple[Take, ...]
+    # Where the middle of each take's lane is beside that of the scene, to the left, m.
+    lanes: tuple[float, ...] = (0.0,)
+    width: float = 0.0  # from the first lane's middle to the last's, m
+
+    def __len__(self) -> int:
+        return round(self.duration * self.fps) + 1
+
+    @property
+    def title(self) -> str:
+        """The titles of its takes, from right to left."""
+        return "  |  ".join(take.title for take in self.takes)
+
+    @property
+    def fps(self) -> float:
+        """Frames/s, those of the take that has most."""
+        return max(take.fps for take in self.takes)
+
+    @property
+    def duration(self) -> float:
+        """Seconds of the longest take; the others wait at their end."""
+        return max(take.duration for take in self.takes)
+
+    def middle(self, time: float) -> Array:
+        """Returns what is in the middle at ``time`` in s, x and y in m, shape (2,)."""
+        bases = [
+            take.q[take.index(time)][POSITION][:2] - np.array([0.0, lane])
+            for take, lane in zip(self.takes, self.lanes, strict=True)
+        ]
+        middle: Array = np.mean(bases, axis=0)
+        return middle
+
+
+def take_of_motion(
+    title: str, motion: Motion, robot: Quadruped, clip: KeypointClip | None = None
+) -> Take:
+    """Returns a take that begins at the origin and heads along +x.
+
+    Args:
+        title: what the page calls it.
+        motion: the motion, of ``robot``.
+        robot: the robot.
+        clip: keypoints to show to the robot's left, in its size and time.
+    """
+    parts = (motion.base_quaternion, motion.base_position, motion.joint_positions)
+    q = np.hstack(parts)
+    turn = yaw_quat(-yaw_of(q[0, :4]))
+    begin = q[0, 4:7] * np.array([1.0, 1.0, 0.0])
+    q[ORIENTATION] = quat_multiply(turn, q[ORIENTATION])
+    q[POSITION] = quat_rotate(turn, q[POSITION] - begin)
+    points = None
+    if clip is not None:
+        clip = resample(clip, motion.fps)
+        ends = (clip.withers[:, None], clip.hip[:, None])
+        points = np.concatenate((clip.toes, *ends), axis=1)
+        # A spline may end a frame before the motion, or after it.
+        shown = np.minimum(np.arange(len(q)), len(points) - 1)
+        points = points[shown] + np.array([0.0, _LANE * robot.stand_height, 0.0])
+    return Take(title, robot, motion.fps, q, points)
+
+
+def one_by_one(takes: Sequence[Take]) -> tuple[Scene, ...]:
+    """Returns a scene for each take."""
+    return tuple(side_by_side([take]) for take in takes)
+
+
+def side_by_side(takes: Sequence[Take]) -> Scene:
+    """Returns one scene, with the first take on the right."""
+    lane = _LANE * max(take.robot.stand_height for take in takes)
+    count = np.array([1 if take.points is None else 2 for take in takes])
+    starts = np.cumsum(count) - count
+    width = lane * float(count.sum() - 1)
+    lanes = lane * starts - width / 2
+    shown = []
+    for take, y in zip(takes, lanes, strict=True):
+        q = take.q.copy()
+        q[..., 5] += y
+        points = None if take.points is None else take.points + np.array([0.0, y, 0.0])
+        shown.append(replace(take, q=q, points=points))
+    return Scene(tuple(shown), tuple(lanes.tolist()), width)
