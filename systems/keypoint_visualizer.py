@@ -5,8 +5,9 @@ from pydrake.geometry import Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import quat_rotate
-from loco_drake.control.state import ORIENTATION, POSITION
+from loco_drake.control.state import JOINTS, ORIENTATION, POSITION
 from loco_drake.models.robots import Robot
 
 from .control import PlanFollower
@@ -39,8 +40,6 @@ class KeypointVisualizer(PlanFollower):
         super().__init__(robot)
         self._meshcat = meshcat
         self._paths = [f"{path}/{name}" for name in NAMES]
-        x = np.abs(robot.p_BHip[:, 0]).mean()
-        self._p_BK = np.array([[x, 0.0, 0.06], [-x, 0.0, 0.06]])
         for name, color in zip(self._paths, COLORS, strict=True):
             meshcat.SetObject(name, Sphere(robot.foot_radius), color)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._publish)
@@ -48,8 +47,20 @@ class KeypointVisualizer(PlanFollower):
 
     def _publish(self, context: Context) -> None:
         plan, k = self._now(context)
-        q = plan.q[k]
-        trunk = q[POSITION] + quat_rotate(q[ORIENTATION], self._p_BK)
-        points = np.concatenate((plan.p_WF[k], trunk))
+        points = keypoints(self._robot, plan.q[k])
         for path, p_W in zip(self._paths, points, strict=True):
             self._meshcat.SetTransform(path, RigidTransform(p_W), context.get_time())
+
+
+def keypoints(robot: Robot, q: Array) -> Array:
+    """Returns toes FL, FR, RL, RR, withers and hip of a robot, m, shape (..., 6, 3).
+
+    ``q`` is [q_WB as w x y z, p_WB, joints], m and rad, shape (..., 7 + J). Withers and
+    hip lie above the front and rear hip joints.
+    """
+    x = np.abs(robot.p_BHip[:, 0]).mean()
+    trunk = np.array([[x, 0.0, 0.06], [-x, 0.0, 0.06]])
+    trunk = np.broadcast_to(trunk, (*q.shape[:-1], *trunk.shape))
+    p_BK = np.concatenate((robot.toe_positions(q[JOINTS]), trunk), axis=-2)
+    turned = quat_rotate(q[ORIENTATION][..., None, :], p_BK)
+    return q[POSITION][..., None, :] + turned

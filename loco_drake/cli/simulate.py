@@ -22,13 +22,16 @@ from loco_drake.cli.simulation import (
     start_meshcat,
     use_weights,
 )
+from loco_drake.cli.video import make_video, prepare_video
 from loco_drake.common.errors import InputError
 from loco_drake.motion.gaits import ANY, parse_schedule
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.motion_file import load_motion
 
 if TYPE_CHECKING:
+    from loco_drake.evaluation.tracking import Rollout
     from loco_drake.systems.scenario import Scenario
+    from loco_drake.viewing.takes import Scene
 
 
 @dataclass(kw_only=True)
@@ -63,6 +66,8 @@ class Simulate:
     port: int | None = None
     # Save a replay as one HTML page.
     html: Path | None = None
+    # Save a video that follows the robot: *.mp4, *.webp or *.gif.
+    video: Path | None = None
     # Contact solver: similar, lagged, sap or cenic.
     contact: Annotated[str | None, option(metavar="STR", default="similar")] = None
     # Time step of the physics, s.
@@ -83,6 +88,8 @@ class Simulate:
         from loco_drake.evaluation import tracking
 
         scenario, duration, motion = self._read()
+        if self.video is not None:
+            prepare_video(self.video, duration)
         meshcat = None
         if self.meshcat or self.html is not None:
             meshcat = start_meshcat(self.port, announce=self.meshcat)
@@ -118,6 +125,8 @@ class Simulate:
                 tracking.frame(meshcat, rollout.state[POSITION])
             if self.html is not None:
                 save_page(meshcat, self.html)
+        if self.video is not None:
+            make_video(self.video, [_scene(scenario.robot, rollout)])
         print_figures("Simulation", figures)
         write_json(self.json, figures)
         return 0
@@ -197,3 +206,17 @@ class Simulate:
                 f"{scenario.robot}."
             )
         return scenario, min(duration, motion.duration), motion
+
+
+def _scene(robot: str, rollout: "Rollout") -> "Scene":
+    """Returns what a robot did, with its plan's keypoints."""
+    from loco_drake.control.state import split
+    from loco_drake.models.robots import get_robot
+    from loco_drake.motion.motion import FPS
+    from loco_drake.systems.keypoint_visualizer import keypoints
+    from loco_drake.viewing.takes import Scene, Take
+
+    model = get_robot(robot)
+    q, _ = split(rollout.state)
+    plan_q, _ = split(rollout.plan_state)
+    return Scene((Take(robot, model, FPS, q, keypoints(model, plan_q)),))

@@ -132,7 +132,7 @@ def viewpoint(scenes: Sequence[Scene]) -> tuple[Array, Array]:
     height = max(take.robot.stand_height for s in scenes for take in s.takes)
     width = max(scene.width for scene in scenes)
     # For one robot as in a simulation; more of them from further behind and above.
-    eye = height * np.array([1.6, -5.8, 2.6]) + width * np.array([0.7, -0.6, 0.6])
+    eye = height * np.array([1.6, -5.8, 2.6]) + width * np.array([0.6, -0.5, 0.5])
     return eye, np.array([0.0, 0.0, 0.7 * height])
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -76,13 +77,29 @@ class Scene:
         return max(take.duration for take in self.takes)
 
     def middle(self, time: float) -> Array:
-        """Returns what is in the middle at ``time`` in s, x and y in m, shape (2,)."""
-        bases = [
-            take.q[take.index(time)][POSITION][:2] - np.array([0.0, lane])
-            for take, lane in zip(self.takes, self.lanes, strict=True)
-        ]
-        middle: Array = np.mean(bases, axis=0)
+        """Returns what is in the middle at ``time`` in s, x and y in m, shape (2,).
+
+        It moves as the takes do on average that have not ended.
+        """
+        frame = min(max(round(time * self.fps), 0), len(self) - 1)
+        middle: Array = self._path[frame]
         return middle
+
+    @cached_property
+    def _path(self) -> Array:
+        """The middle at each frame, m, shape (T, 2)."""
+        steps = np.zeros((len(self.takes), len(self) - 1, 2))
+        for k, take in enumerate(self.takes):
+            shown = [take.index(frame / self.fps) for frame in range(len(self))]
+            steps[k] = np.diff(take.q[shown][POSITION][:, :2], axis=0)
+        times = np.arange(len(self) - 1) / self.fps
+        lasts = np.array([take.duration - 1e-6 for take in self.takes])
+        going = times < lasts[:, None]
+        mean = (steps * going[..., None]).sum(axis=0) / going.sum(axis=0)[:, None]
+        starts = [take.q[0][POSITION][:2] for take in self.takes]
+        lanes = np.stack((np.zeros(len(self.lanes)), self.lanes), axis=-1)
+        start = np.mean(np.array(starts) - lanes, axis=0)
+        return np.concatenate((start[None], start + np.cumsum(mean, axis=0)))
 
 
 def take_of_motion(

@@ -9,6 +9,7 @@ from PIL import Image
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import atomic_path
+from loco_drake.systems.keypoint_visualizer import COLORS
 from loco_drake.viewing.rendering import HEIGHT, WIDTH, Picture
 
 SUFFIXES = (".mp4", ".webp", ".gif")
@@ -18,7 +19,8 @@ _MAX_SECONDS = 120.0
 # Constant rate factor of H.264: 18 cannot be told from the original, 28 is coarse.
 _MP4_QUALITY = 23
 _WEBP_QUALITY = 70  # of 100
-_GIF_COLORS = 64
+# GIF packs so badly that it gets half the width and height.
+_GIF_COLORS, _GIF_REDUCTION = 64, 2
 _BLOCK = 8  # pixels; sides are multiples of it
 
 
@@ -88,7 +90,7 @@ def _write_mp4(path: Path, pictures: Iterable[Picture]) -> None:
 def _write_animation(path: Path, pictures: Iterable[Picture]) -> None:
     gif = path.suffix.lower() == ".gif"
     images = map(Image.fromarray, pictures)
-    frames = _with_one_palette(images) if gif else images
+    frames = _for_gif(images) if gif else images
     first = next(frames)
     first.save(
         path,
@@ -100,9 +102,14 @@ def _write_animation(path: Path, pictures: Iterable[Picture]) -> None:
     )
 
 
-def _with_one_palette(images: Iterator[Image.Image]) -> Iterator[Image.Image]:
-    """Yields images in the colours of the first, so that what stays does not flicker."""
-    first = next(images)
-    palette = first.quantize(_GIF_COLORS, dither=Image.Dither.NONE)
-    for image in chain([first], images):
+def _for_gif(images: Iterator[Image.Image]) -> Iterator[Image.Image]:
+    """Yields images of half the size in the same few colours, so that none flickers."""
+    reduced = (image.reduce(_GIF_REDUCTION) for image in images)
+    first = next(reduced)
+    # The plan's few pixels would get no colours of their own.
+    few = [round(255 * part) for color in COLORS for part in color.rgba[:3]]
+    found = first.quantize(_GIF_COLORS - len(COLORS)).getpalette() or []
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*found[: 3 * (_GIF_COLORS - len(COLORS))], *few])
+    for image in chain([first], reduced):
         yield image.quantize(palette=palette, dither=Image.Dither.NONE)
