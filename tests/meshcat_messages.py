@@ -1,5 +1,7 @@
 """What Meshcat's page sends when a control is used, in MessagePack."""
 
+import base64
+import re
 import struct
 
 
@@ -33,3 +35,77 @@ def gamepad(meshcat, *axes):
     pad = {"index": 0, "button_values": [], "axes": list(map(float, axes))}
     message = {"type": "gamepad", "name": "", "gamepad": pad if axes else {}}
     meshcat._InjectWebsocketMessage(pack(message))
+
+
+def unpack(data):
+    """Returns the value in MessagePack that ``data`` begins with."""
+    return _unpack(data, 0)[0]
+
+
+# Of a first byte: format of what follows it, a number or a length, and what that is of.
+_FORMATS = {
+    0xC4: ("B", bytes),
+    0xC5: (">H", bytes),
+    0xC6: (">I", bytes),
+    0xCA: (">f", None),
+    0xCB: (">d", None),
+    0xCC: ("B", None),
+    0xCD: (">H", None),
+    0xCE: (">I", None),
+    0xCF: (">Q", None),
+    0xD0: ("b", None),
+    0xD1: (">h", None),
+    0xD2: (">i", None),
+    0xD3: (">q", None),
+    0xD9: ("B", str),
+    0xDA: (">H", str),
+    0xDB: (">I", str),
+    0xDC: (">H", list),
+    0xDD: (">I", list),
+    0xDE: (">H", dict),
+    0xDF: (">I", dict),
+}
+
+
+def _unpack(data, k):
+    """Returns the value at byte ``k`` and where the next one begins."""
+    first, k = data[k], k + 1
+    if first in (0xC0, 0xC2, 0xC3):
+        return {0xC0: None, 0xC2: False, 0xC3: True}[first], k
+    if first < 0x80 or first >= 0xE0:
+        return (first if first < 0x80 else first - 0x100), k
+    if first < 0xC0:
+        kind = dict if first < 0x90 else list if first < 0xA0 else str
+        number = first & (0x1F if kind is str else 0x0F)
+    else:
+        form, kind = _FORMATS[first]
+        (number,) = struct.unpack_from(form, data, k)
+        k += struct.calcsize(form)
+    if kind is None:
+        return number, k
+    if kind in (str, bytes):
+        part = bytes(data[k : k + number])
+        return (part.decode() if kind is str else part), k + number
+    values = []
+    for _ in range(number * (2 if kind is dict else 1)):
+        value, k = _unpack(data, k)
+        values.append(value)
+    if kind is dict:
+        return dict(zip(values[::2], values[1::2], strict=True)), k
+    return values, k
+
+
+def animation(page):
+    """Returns the tracks in a saved page: time in frames and value, by path and name.
+
+    Args:
+        page: the page's HTML.
+    """
+    parts = re.findall(r"base64,([A-Za-z0-9+/=]+)", page)
+    packed = [p for p in map(base64.b64decode, parts) if b"set_animation" in p]
+    (command,) = map(unpack, packed)
+    return {
+        (part["path"], track["name"]): [(k["time"], k["value"]) for k in track["keys"]]
+        for part in command["animations"]
+        for track in part["clip"]["tracks"]
+    }

@@ -63,7 +63,7 @@ class Figure:
         self._joints = [joint.position_start() for joint in joints]
 
     def put(self, positions: Array, q: Array, middle: Array) -> None:
-        """Writes into the plant's ``positions`` that the robot is at ``q`` - ``middle``.
+        """Writes into a plant's ``positions`` that the robot is at ``q`` - ``middle``.
 
         Args:
             positions: of the plant.
@@ -77,7 +77,7 @@ class Figure:
         positions[self._joints] = q[JOINTS]
 
     def hide(self, positions: Array) -> None:
-        """Writes into the plant's ``positions`` that the robot is out of sight."""
+        """Writes into a plant's ``positions`` that the robot is out of sight."""
         put_body(positions, self._start, AWAY)
 
 

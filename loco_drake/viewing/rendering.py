@@ -1,5 +1,7 @@
 """Pictures by Drake's renderer, without a screen and without a browser."""
 
+import ctypes
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +33,7 @@ Picture = NDArray[np.uint8]  # red, green, blue, shape (HEIGHT, WIDTH, 3)
 
 WIDTH, HEIGHT = 640, 360  # pixels
 _NAME = "vtk"
-_FIELD_OF_VIEW = 0.55  # rad, from top to bottom
+FIELD_OF_VIEW = 0.55  # rad, from top to bottom
 _NEAR, _FAR = 0.05, 60.0  # m
 _SKY = [0.75, 0.83, 0.92]  # as in Meshcat
 # The sun, from above and behind the camera's left shoulder, and a lamp at the camera,
@@ -40,6 +42,10 @@ _LIGHTS = [
     LightParameter(type="directional", frame="world", direction=[0.35, 0.6, -1.2]),
     LightParameter(type="point", frame="camera", intensity=0.35),
 ]
+_LACKS = (
+    "Videos need EGL to render without a screen; on Debian or Ubuntu, install it with: "
+    "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri."
+)
 _SHADOW_PIXELS = 1024  # less are blurred
 
 
@@ -55,13 +61,33 @@ def make_engine() -> RenderEngine:
         cast_shadows=True,
         shadow_map_size=_SHADOW_PIXELS,
     )
+    if not can_render():
+        raise OSError(_LACKS)
+    return MakeRenderEngineVtk(params)
+
+
+def can_render() -> bool:
+    """Returns whether there is a graphics card or software that stands in for one.
+
+    Without one, Drake's renderer on Linux ends the process at its first picture.
+    """
+    if sys.platform != "linux":
+        return True
     try:
-        return MakeRenderEngineVtk(params)
-    except RuntimeError as error:
-        raise OSError(
-            "Drake cannot render pictures here; on Debian or Ubuntu, install what it "
-            f"needs with: apt-get install libegl1 libgl1-mesa-dri ({error})"
-        ) from None
+        egl = ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        return False
+    egl.eglGetProcAddress.restype = ctypes.c_void_p
+    egl.eglGetProcAddress.argtypes = [ctypes.c_char_p]
+    address = egl.eglGetProcAddress(b"eglQueryDevicesEXT")
+    if address is None:
+        return False
+    count = ctypes.c_int32(0)
+    pointer = ctypes.POINTER(ctypes.c_int32)
+    query = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_int32, ctypes.c_void_p, pointer)(
+        address
+    )
+    return bool(query(0, None, ctypes.byref(count))) and count.value > 0
 
 
 def AddRenderEngine(plant: MultibodyPlant, scene_graph: SceneGraph) -> None:
@@ -77,7 +103,7 @@ class Camera:
     """A camera at ``eye`` that looks at ``target``, both (3,) in m."""
 
     def __init__(self, eye: Array, target: Array) -> None:
-        intrinsics = CameraInfo(WIDTH, HEIGHT, _FIELD_OF_VIEW)
+        intrinsics = CameraInfo(WIDTH, HEIGHT, FIELD_OF_VIEW)
         core = RenderCameraCore(
             _NAME, intrinsics, ClippingRange(_NEAR, _FAR), RigidTransform()
         )

@@ -14,7 +14,9 @@ def record(stage: Stage, meshcat: Meshcat) -> None:
     """Records all scenes of a stage in its Meshcat, one after another."""
     meshcat.SetCameraPose(*viewpoint(stage.scenes))
     meshcat.StartRecording(frames_per_second=FRAMES_PER_SECOND)
-    for number, (scene, time) in enumerate(frame_times(stage.scenes, FRAMES_PER_SECOND)):
+    for number, (scene, time) in enumerate(
+        frame_times(stage.scenes, FRAMES_PER_SECOND)
+    ):
         stage.draw(scene, time, at=number / FRAMES_PER_SECOND)
     meshcat.StopRecording()
     meshcat.PublishRecording()

@@ -54,7 +54,7 @@ class Stage:
         *,
         rendered: bool = False,
     ) -> None:
-        self.scenes = tuple(scenes)
+        self.scenes, self.meshcat = tuple(scenes), meshcat
         builder = DiagramBuilder()
         plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
         self._plant = plant
@@ -155,4 +155,3 @@ def _AddFloor(plant: MultibodyPlant) -> RigidBody:
     floor.set_perception_properties(PerceptionProperties())
     plant.RegisterVisualGeometry(body, floor)
     return body
-

@@ -1,4 +1,4 @@
-"""Video files: MP4 by the ffmpeg of the package imageio-ffmpeg, WebP and GIF by Pillow."""
+"""Video files: MP4 by ffmpeg of the package imageio-ffmpeg, WebP and GIF by Pillow."""
 
 from collections.abc import Iterable, Iterator
 from importlib.util import find_spec

@@ -12,6 +12,12 @@ from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion_file import save_motion
 from loco_drake.systems.gait_selector import measured_gaits
 from tests.synthetic_motion import synthetic_motion
+from tests.viewing.pictures import (
+    needs_renderer,
+    plan_pixels,
+    read_video,
+    robot_columns,
+)
 
 KEYS = {
     "robot",
@@ -116,6 +122,26 @@ def test_port_in_use_and_replay(weights, tmp_path, monkeypatch, capsys):
     assert str(port) not in printed.out
     assert "<html" in page.read_text()[:1000]
     assert 1e6 < page.stat().st_size < 10e6
+
+
+@needs_renderer
+def test_a_video_shows_the_robot_and_its_plan(weights, tmp_path):
+    path = tmp_path / "a.webp"
+    policy = weights / "calm.safetensors"
+    line = ("--no-meshcat", "--duration", 0.4, "--policy", policy, "--video", path)
+    assert simulate(tmp_path, *line)["simulated_s"] == 0.4
+    pictures, rate = read_video(path)
+    assert len(pictures) == 11
+    assert rate == pytest.approx(25)
+    for picture in pictures[[0, -1]]:
+        assert robot_columns(picture).mean() > 0.1
+        assert min(plan_pixels(picture)) > 20
+
+
+def test_a_video_of_another_format_is_refused_before_the_simulation(tmp_path, capsys):
+    line = ["simulate", "--no-meshcat", "--duration", "3600", "--video"]
+    assert main([*line, str(tmp_path / "a.avi")]) == 2
+    assert "named *.mp4, *.webp, *.gif, not 'a.avi'" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -1,0 +1,56 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from loco_drake.motion.motion import FPS
+from loco_drake.systems.keypoint_visualizer import keypoints
+from loco_drake.viewing import rendering
+from loco_drake.viewing.rendering import HEIGHT, WIDTH, make_engine
+from loco_drake.viewing.replay import pictures
+from loco_drake.viewing.takes import Scene, Take, take_of_motion
+from tests.synthetic_motion import synthetic_motion
+from tests.viewing.pictures import needs_renderer, plan_pixels, robot_columns
+
+
+@needs_renderer
+def test_the_robot_stays_in_the_picture_while_it_runs_metres(go2):
+    """It fills more than a tenth of the width, near the middle, and the floor moves."""
+    take = take_of_motion("a", synthetic_motion(seconds=4.0, speed=1.4), go2)
+    assert take.q[-1, 4] > 5
+    taken = list(pictures([Scene((take,))], 0.5))
+    assert len(taken) == 3
+    for picture in taken:
+        assert picture.shape == (HEIGHT, WIDTH, 3)
+        columns = np.flatnonzero(robot_columns(picture))
+        assert len(columns) > WIDTH / 10
+        assert abs(np.median(columns) - WIDTH / 2) < WIDTH / 8
+        # The floor's tiles are of two greys, and the sky is blue.
+        ground = picture[-20:].reshape(-1, 3).astype(int)
+        assert np.ptp(ground[:, 0]) > 15
+        assert picture[0, 0, 2] > picture[0, 0, 0] + 25
+    for one, other in pairwise(taken):
+        assert (np.abs(one.astype(int) - other) > 8).any(axis=-1).mean() > 0.02
+
+
+@needs_renderer
+def test_the_plan_is_seen_beside_the_robot(go2):
+    """In the colours that Meshcat gives its points, and only if there is one."""
+    take = take_of_motion("a", synthetic_motion(seconds=0.2), go2)
+    plan_q = take.q.copy()
+    plan_q[:, 5] -= 0.1
+    planned = Take("a", go2, FPS, take.q, keypoints(go2, plan_q))
+    (alone,) = pictures([Scene((take,))], 1)
+    (both,) = pictures([Scene((planned,))], 1)
+    assert max(plan_pixels(alone)) < 10
+    assert min(plan_pixels(both)) > 100
+
+
+def test_a_machine_that_cannot_render_is_told_what_it_lacks(monkeypatch):
+    def missing(name):
+        raise OSError(f"{name}: cannot open shared object file")
+
+    monkeypatch.setattr(rendering.sys, "platform", "linux")
+    monkeypatch.setattr(rendering.ctypes, "CDLL", missing)
+    with pytest.raises(OSError, match="apt-get install libegl1"):
+        make_engine()
