@@ -1,5 +1,7 @@
 """The controls of a player on Meshcat's page."""
 
+from math import isfinite
+
 from pydrake.geometry import Meshcat
 
 from loco_drake.systems.meshcat_driver import MeshcatText
@@ -89,7 +91,7 @@ class Player:
         pressed = self._pressed()
         # A page that sends the slider's value sends one that it was not told.
         asked = self._meshcat.GetSliderValue(SLIDER)
-        if asked != self._shown:
+        if asked != self._shown and isfinite(asked):
             self.seek(round(asked))
         if pressed[PAUSE] % 2:
             self.paused = not self.paused

@@ -30,7 +30,8 @@ def source_clip(motion: Motion, folder: Path) -> KeypointClip:
     if missing:
         raise InputError(f"its provenance names no {missing[0]} of a recording.")
     dataset = get_dataset(motion.source)
-    found = sorted((folder / dataset.folder).rglob(Path(known["file"]).name))
+    files = sorted((folder / dataset.folder).rglob("*"))
+    found = [path for path in files if path.name == known["file"] and path.is_file()]
     if not found:
         raise InputError(f"there is no {known['file']} in {folder / dataset.folder}.")
     try:

@@ -48,13 +48,13 @@ def test_a_page_of_three_robots_and_what_is_said_of_them(files, tmp_path, capsys
     text = page.read_text()
     assert "<html" in text[:1000]
     heights = {
-        path.split("/")[4]: np.array([value[2] for _, value in keys])
+        path.split("/")[3]: np.array([value[2] for _, value in keys])
         for (path, name), keys in animation(text).items()
         if name == ".position" and path.endswith(("/base", "/base_link"))
     }
     # One after another: 20, 33 and 16 pictures at 32 a second.
-    for robot, first, count in (("go2", 0, 20), ("a1", 20, 33), ("solo8", 53, 16)):
-        seen = np.flatnonzero(heights[robot] > 0)
+    for number, (first, count) in enumerate(((0, 20), (20, 33), (53, 16))):
+        seen = np.flatnonzero(heights[f"figure{number}"] > 0)
         np.testing.assert_array_equal(seen, first + np.arange(count))
 
 
