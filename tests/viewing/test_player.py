@@ -142,3 +142,10 @@ def test_the_slider_goes_to_a_frame_and_follows_when_it_plays(player, meshcat):
     player.update(0.02)
     assert player.frame == 49
     assert not player.paused
+
+
+def test_a_slider_that_is_no_number_moves_nothing(player, meshcat):
+    move(meshcat, SLIDER, float("nan"))
+    player.update(0.1)
+    assert player.frame == 5
+    assert not player.paused
