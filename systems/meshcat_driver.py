@@ -1,5 +1,6 @@
 """A driver's controls on Meshcat's page: keys, sliders, buttons and a gamepad."""
 
+from collections import Counter
 from collections.abc import Sequence
 from html import escape
 from math import isfinite
@@ -95,7 +96,7 @@ class MeshcatDriver:
         buttons = {**_KEYS, **dict.fromkeys(gaits, "")}
         for name, key in buttons.items():
             meshcat.AddButton(name, key)
-        self._clicks = dict.fromkeys(buttons, 0)
+        self._clicks = Counter(dict.fromkeys(buttons, 0))
 
     @property
     def stopped(self) -> bool:
@@ -117,20 +118,22 @@ class MeshcatDriver:
         for number, gait in enumerate(self._gaits):
             if gait in pressed:
                 self._gait = number
-        step = sum(GAIT_STEPS[name] for name in pressed & GAIT_STEPS.keys())
+        step = sum(pressed[name] * size for name, size in GAIT_STEPS.items())
         self._gait = (self._gait + step) % len(self._gaits)
         orders[GAIT] = gait_index(self._gaits[self._gait])
-        pushes = sorted(pressed & PUSHES.keys())
+        pushes = sorted(pressed.keys() & PUSHES.keys())
         if pushes and time >= self._pushed + _PUSH_PAUSE:
             orders[PUSH] = PUSHES[pushes[0]]
             self._pushed = time
         orders[RESET] = RESET_BUTTON in pressed
         return orders
 
-    def _pressed(self) -> set[str]:
-        """Returns the buttons that were pressed since the last call."""
-        clicks = {name: self._meshcat.GetButtonClicks(name) for name in self._clicks}
-        pressed = {name for name in clicks if clicks[name] > self._clicks[name]}
+    def _pressed(self) -> Counter[str]:
+        """Returns how often each button was pressed since the last call."""
+        clicks = Counter(
+            {name: self._meshcat.GetButtonClicks(name) for name in self._clicks}
+        )
+        pressed = clicks - self._clicks
         self._clicks = clicks
         return pressed
 

@@ -37,7 +37,7 @@ def test_figure_shows_each_contact_as_a_bar(tmp_path):
     write_dog_recording(tmp_path / "dog.txt", "trot")
     clip = read_clip("dog", tmp_path / "dog.txt", gait="trot")
     _, contacts = summarize(clip)
-    figure = clip_figure(clip, contacts, "a trot")
+    figure = clip_figure(clip, contacts, [], "a trot")
     bars = figure.axes[1].collections
     assert len(bars) == 4
     for leg, row in enumerate(bars):

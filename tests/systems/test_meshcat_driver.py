@@ -95,6 +95,10 @@ def test_gaits_have_buttons_and_two_keys_go_through_them(meshcat, driver):
         gaits.append(int(driver.sample(0.1)[GAIT]))
     # From the second label, dog-trot, and round by way of any.
     assert gaits == [0, -1, 14, -1, 0, 1, 2]
+    # Twice in a control period, as a slow simulation sees it: back to the first label.
+    for _ in range(2):
+        click(meshcat, "Previous gait (Z)")
+    assert driver.sample(0.1)[GAIT] == 0
     for name, index in (("solo8-wave", 14), ("any", -1)):
         click(meshcat, name)
         assert driver.sample(0.2)[GAIT] == index
