@@ -1,7 +1,7 @@
 """A driver's controls on Meshcat's page: keys, sliders, buttons and a gamepad."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 from math import isfinite
 
@@ -71,6 +71,23 @@ class MeshcatText:
         self._shown = text
 
 
+class ButtonPresses:
+    """Counts the presses of buttons that were just added to a Meshcat's page."""
+
+    def __init__(self, meshcat: Meshcat, names: Iterable[str]) -> None:
+        self._meshcat = meshcat
+        self._clicks = Counter(dict.fromkeys(names, 0))
+
+    def new(self) -> Counter[str]:
+        """Returns how often each button was pressed since the last call."""
+        clicks = Counter(
+            {name: self._meshcat.GetButtonClicks(name) for name in self._clicks}
+        )
+        pressed = clicks - self._clicks
+        self._clicks = clicks
+        return pressed
+
+
 class MeshcatDriver:
     """Adds a driver's controls to Meshcat's page and reads them.
 
@@ -96,7 +113,7 @@ class MeshcatDriver:
         buttons = {**_KEYS, **dict.fromkeys(gaits, "")}
         for name, key in buttons.items():
             meshcat.AddButton(name, key)
-        self._clicks = Counter(dict.fromkeys(buttons, 0))
+        self._presses = ButtonPresses(meshcat, buttons)
 
     @property
     def stopped(self) -> bool:
@@ -109,7 +126,7 @@ class MeshcatDriver:
         Args:
             time: the simulation's time, s; pushes are at least half a second apart.
         """
-        pressed = self._pressed()
+        pressed = self._presses.new()
         if HALT in pressed:
             for name, *_ in SLIDERS:
                 self._meshcat.SetSliderValue(name, 0.0)
@@ -127,15 +144,6 @@ class MeshcatDriver:
             self._pushed = time
         orders[RESET] = RESET_BUTTON in pressed
         return orders
-
-    def _pressed(self) -> Counter[str]:
-        """Returns how often each button was pressed since the last call."""
-        clicks = Counter(
-            {name: self._meshcat.GetButtonClicks(name) for name in self._clicks}
-        )
-        pressed = clicks - self._clicks
-        self._clicks = clicks
-        return pressed
 
     def _command(self) -> Array:
         low, high = (np.array([slider[k] for slider in SLIDERS]) for k in (1, 2))

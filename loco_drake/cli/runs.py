@@ -1,7 +1,5 @@
 """``loco-drake runs list``: the trainings in a folder."""
 
-import fcntl
-import os
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -67,7 +65,7 @@ def find_runs(root: Path) -> list[dict[str, Any]]:
     "interrupted", which --resume continues. "return" is the mean over labels of the
     normalized return (0-100) in recent training episodes, None of other trainings.
     """
-    from loco_drake.common.run_folder import CHECKPOINT, read_checkpoint
+    from loco_drake.common.run_folder import CHECKPOINT, is_locked, read_checkpoint
     from loco_drake.common.weights import kind_of
     from loco_drake.tracking.learning_curve import PROGRESS, learning_curve
 
@@ -95,21 +93,9 @@ def find_runs(root: Path) -> list[dict[str, Any]]:
                 "training": training,
                 "steps": steps,
                 "of_steps": planned,
-                "state": "at work" if _is_locked(folder) else ended,
+                "state": "at work" if is_locked(folder) else ended,
                 "return": score,
                 "changed": changed.isoformat(timespec="seconds"),
             }
         )
     return runs
-
-
-def _is_locked(folder: Path) -> bool:
-    """Returns whether a training holds the lock of a folder, see run_folder.locked."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(handle)
-    return False

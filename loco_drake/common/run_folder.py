@@ -137,6 +137,18 @@ def locked(folder: Path) -> Iterator[None]:
         os.close(handle)
 
 
+def is_locked(folder: Path) -> bool:
+    """Returns whether a process holds the lock of a folder, see :func:`locked`."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(handle)
+    return False
+
+
 def check_folder(folder: Path, weights: str, resume: bool) -> None:
     """Raises InputError if a training cannot start, or resume, in ``folder``."""
     found = [file for file in (CHECKPOINT, weights) if (folder / file).exists()]

@@ -18,9 +18,9 @@ from loco_drake.common.arrays import Array
 from loco_drake.generation import features as ft
 from loco_drake.generation.tokenizer_score import over_ground
 from loco_drake.models.robots import Robot, get_robot
+from loco_drake.motion.momentum import G
 from loco_drake.motion.motion import FPS
 
-G = 9.81  # m/s^2
 # Alternate corners of a box, (4, 3).
 _CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 _POINTS = len(_CORNERS)  # of a body

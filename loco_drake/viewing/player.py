@@ -4,7 +4,7 @@ from math import isfinite
 
 from pydrake.geometry import Meshcat
 
-from loco_drake.systems.meshcat_driver import MeshcatText
+from loco_drake.systems.meshcat_driver import ButtonPresses, MeshcatText
 from loco_drake.viewing.stage import Stage, viewpoint
 
 PAUSE = "Pause (Space)"
@@ -40,7 +40,7 @@ class Player:
         self.paused = False
         for name, key in BUTTONS.items():
             meshcat.AddButton(name, key)
-        self._clicks = dict.fromkeys(BUTTONS, 0)
+        self._presses = ButtonPresses(meshcat, BUTTONS)
         meshcat.SetCameraPose(*viewpoint(stage.scenes))
         self.select(0)
 
@@ -88,7 +88,7 @@ class Player:
         Args:
             elapsed: time since the last call, s.
         """
-        pressed = self._pressed()
+        pressed = self._presses.new()
         # A page that sends the slider's value sends one that it was not told.
         asked = self._meshcat.GetSliderValue(SLIDER)
         if asked != self._shown and isfinite(asked):
@@ -108,13 +108,6 @@ class Player:
             return
         self._told += elapsed
         self._show(self._told >= _TOLD)
-
-    def _pressed(self) -> dict[str, int]:
-        """Returns how often each button was pressed since the last call."""
-        clicks = {name: self._meshcat.GetButtonClicks(name) for name in self._clicks}
-        pressed = {name: clicks[name] - self._clicks[name] for name in clicks}
-        self._clicks = clicks
-        return pressed
 
     def _show(self, told: bool) -> None:
         """Draws the frame unless it is drawn, and says which it is if ``told``."""
