@@ -101,9 +101,9 @@ def load_drive(path: Path) -> Drive:
         )
     try:
         for name, kind in (_FIELDS | _LATER).items():
-            if (name in _FIELDS or name in header) and type(
-                header.get(name)
-            ) is not kind:
+            if name in _LATER and name not in header:
+                continue
+            if type(header.get(name)) is not kind:
                 raise InputError(f"its header lacks {name}.")
         if header.get("columns") != list(COLUMNS):
             raise InputError(f"its columns must be {', '.join(COLUMNS)}.")

@@ -16,6 +16,7 @@ from loco_drake.common.rotations import (
 from loco_drake.control.state import ORIENTATION, POSITION
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion.keypoints import KeypointClip
+from loco_drake.motion.momentum import positions
 from loco_drake.motion.motion import Motion
 from loco_drake.retargeting.scaling import resample
 
@@ -113,8 +114,7 @@ def take_of_motion(
         robot: the robot.
         clip: keypoints to show to the robot's left, in its size and time.
     """
-    parts = (motion.base_quaternion, motion.base_position, motion.joint_positions)
-    q = np.hstack(parts)
+    q = positions(motion)
     turn = yaw_quat(-yaw_of(q[0, :4]))
     begin = q[0, 4:7] * np.array([1.0, 1.0, 0.0])
     q[ORIENTATION] = quat_multiply(turn, q[ORIENTATION])
