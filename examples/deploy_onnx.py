@@ -2,7 +2,7 @@
 
 One command of loco_drake writes the three files, docs/deploy.md says what is in them:
 
-    loco-drake export --out policy.onnx --plans plans.npz --mjcf go2.xml
+    loco-drake export --onnx policy.onnx --plans plans.npz --mjcf go2.xml
 """
 
 import argparse

@@ -31,10 +31,10 @@ class PlantConfig:
 
     # Time step of the discrete plant in s; with cenic, the longest step.
     time_step: float = 0.01
-    # Contact solver: similar, lagged or sap for a discrete plant, or cenic for a
-    # continuous plant with error control.
+    # Contact solver: similar, lagged, sap or cenic. The last is of a continuous plant
+    # with error control.
     contact: str = "similar"
-    # Accuracy of the CENIC integrator.
+    # Accuracy of the integrator of cenic.
     accuracy: float = 1e-3
     # Coulomb friction coefficient of the ground. A contact uses the harmonic mean with
     # the feet's .8.

@@ -1,10 +1,13 @@
 """The shipped weights."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from loco_drake.common.errors import InputError
 
-from .robots import ROBOTS, Robot
+# Help of commands lists the policies, and does not wait for Drake.
+if TYPE_CHECKING:
+    from .robots import Robot
 
 
 def pretrained_dir() -> Path:
@@ -47,14 +50,32 @@ def weights_in(folder: Path) -> dict[str, Path]:
     return found
 
 
-def policy_variants(robot: Robot) -> dict[str, Path]:
+def chosen_weights(folder: Path | None, **files: Path | None) -> dict[str, Path | None]:
+    """Returns weights by kind: those of ``files``, else those in a folder of runs.
+
+    Raises:
+        InputError: as :func:`weights_in`.
+    """
+    found = weights_in(folder) if folder is not None else {}
+    return {kind: file or found.get(kind) for kind, file in files.items()}
+
+
+def shipped_policies() -> dict[str, Path]:
+    """Returns the shipped policies: "go2", "go2_unprivileged", and so on."""
+    return {
+        file.stem.removeprefix("policy_"): file
+        for file in sorted(pretrained_dir().glob("policy_*.safetensors"))
+    }
+
+
+def policy_variants(robot: "Robot") -> dict[str, Path]:
     """Returns the shipped policies of ``robot`` except the main one, by name."""
-    prefix = f"policy_{robot.name}_"
-    files = sorted(pretrained_dir().glob(f"{prefix}*.safetensors"))
-    return {file.stem.removeprefix(prefix): file for file in files}
+    prefix = f"{robot.name}_"
+    shipped = shipped_policies().items()
+    return {k.removeprefix(prefix): f for k, f in shipped if k.startswith(prefix)}
 
 
-def policy_path(robot: Robot, policy: Path | None = None) -> Path:
+def policy_path(robot: "Robot", policy: Path | None = None) -> Path:
     """Returns the weights file of a policy.
 
     ``policy`` is a weights file, which is returned as it is, or the name of a shipped
@@ -66,6 +87,8 @@ def policy_path(robot: Robot, policy: Path | None = None) -> Path:
     if policy is None:
         main = pretrained_path(f"policy_{robot.name}")
         if not main.is_file():
+            from .robots import ROBOTS
+
             shipped = [n for n in ROBOTS if pretrained_path(f"policy_{n}").is_file()]
             raise InputError(
                 f"There are no policy weights for {robot.name} yet; "
@@ -96,10 +119,7 @@ def training_path(name: Path) -> Path:
     """
     if name.is_file():
         return name
-    shipped = {
-        file.stem.removeprefix("policy_"): file
-        for file in sorted(pretrained_dir().glob("policy_*.safetensors"))
-    }
+    shipped = shipped_policies()
     if str(name) not in shipped:
         raise InputError(
             f"There is nothing to start from at {str(name)!r}; give a checkpoint or "

@@ -173,7 +173,7 @@ def test_installed_wheel_has_the_command(installed, tmp_path):
 REPORT = """
 from loco_drake.cli.main import main
 
-raise SystemExit(main(["report", "--replays", "none"]))
+raise SystemExit(main(["report", "--labels", "none"]))
 """
 
 

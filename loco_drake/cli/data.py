@@ -3,17 +3,35 @@
 from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from loco_drake.cli.options import DataDir, Json, UnusedSeed
-from loco_drake.cli.output import print_table, write_figure, write_json
+from loco_drake.cli.options import (
+    SOURCES,
+    DataDir,
+    End,
+    Fps,
+    Json,
+    Output,
+    Start,
+    UnusedSeed,
+    option,
+)
+from loco_drake.cli.output import (
+    check_output,
+    do_all,
+    print_table,
+    write_figure,
+    write_json,
+)
 from loco_drake.common.errors import InputError
 
 if TYPE_CHECKING:
     from loco_drake.retargeting.cuts import Cut
     from loco_drake.retargeting.inspection import ClipSummary
+
+_PLOTS = (".png", ".pdf", ".svg")
 
 
 @dataclass(kw_only=True)
@@ -42,7 +60,6 @@ class DataList:
                 "licence": dataset.licence,
                 "attribution": dataset.attribution,
             }
-        write_json(self.json, figures)
         rows = [
             [
                 source,
@@ -56,7 +73,10 @@ class DataList:
             for source, row in figures.items()
         ]
         columns = ["source", "clips", "frames", "seconds", "Hz", "gaits", "licence"]
-        print_table("Sources of motion", columns, rows)
+        do_all(
+            lambda: print_table("Sources of motion", columns, rows),
+            lambda: write_json(self.json, figures),
+        )
         return 0
 
 
@@ -69,21 +89,31 @@ class DataInspect:
     """
 
     # A recording.
-    file: tyro.conf.Positional[Path]
-    # Source whose format the file has: dog, horse, mpc, solo8, or a YAML file that
-    # names the joints of another animal's, see docs/own_animal.md.
-    source: str = "dog"
-    # First frame, counted from 0 at the file's rate. Default: the first usable one.
-    start: int | None = None
-    # End frame, exclusive. Default: the end of the file.
-    end: int | None = None
-    # Rate in frames/s. Default: inferred from format, name or motion.
-    fps: float | None = None
+    file: Annotated[Path, tyro.conf.Positional, option(metavar="FILE")]
+    source: Annotated[
+        str,
+        option(
+            f"{SOURCES}, whose format the file has; or a YAML file that names the "
+            "joints of another animal's, see docs/own_animal.md.",
+            metavar="SOURCE",
+        ),
+    ] = "dog"
+    start: Start = None
+    end: End = None
+    fps: Fps = None
     # Print joints, rate, axes and unit, and propose a skeleton's YAML file.
     skeleton: bool = False
-    # PNG file to write, or YAML file with --skeleton. Default: a PNG file in the
-    # current folder, named like the recording; no YAML file, only its text.
-    out: Path | None = None
+    # Plot to write: *.png, *.pdf or *.svg; with --skeleton the skeleton, *.yaml.
+    out: Annotated[
+        Path | None,
+        option(
+            name="save",
+            metavar="FILE",
+            default="a PNG file in the current folder, named like the recording; no "
+            "YAML file, only its text",
+        ),
+        Output.FILE,
+    ] = None
     json: Json = None
     seed: UnusedSeed = 0
 
@@ -97,19 +127,29 @@ class DataInspect:
         from loco_drake.retargeting.inspection import clip_figure, summarize
 
         source = load_source(self.source)
+        if self.out is not None and self.out.suffix not in _PLOTS:
+            raise InputError(
+                f"A plot ends in {', '.join(_PLOTS)}, unlike {self.out}; a skeleton's "
+                "file needs --skeleton."
+            )
         clip = read_clip(source, self.file, "unknown", self.start, self.end, self.fps)
         summary, contacts = summarize(clip)
         cuts = propose_cuts(clip)
         stretch = f"{self.file.stem}-{clip.provenance['frames']}"
         out = self.out or Path(f"{stretch}.png")
-        write_figure(clip_figure(clip, contacts, cuts, stretch), out, dpi=100)
+        check_output(out)
+        plot = clip_figure(clip, contacts, cuts, stretch)
         licence = clip.provenance["licence"]
         proposed = [asdict(cut) for cut in cuts]
         figures = {**asdict(summary), "cuts": proposed, "licence": licence}
-        write_json(self.json, figures)
-        print_table(f"{stretch}, drawn in {out}", ["", "value"], _rows(summary))
-        if len(cuts) > 1:
-            _print_cuts(cuts)
+        do_all(
+            lambda: print_table(
+                f"{stretch}, drawn in {out}", ["", "value"], _rows(summary)
+            ),
+            lambda: _print_cuts(cuts),
+            lambda: write_json(self.json, figures),
+            lambda: write_figure(plot, out, dpi=100),
+        )
         return 0
 
     def _inspect_skeleton(self) -> int:
@@ -125,6 +165,8 @@ class DataInspect:
 
 
 def _print_cuts(cuts: "list[Cut]") -> None:
+    if len(cuts) < 2:
+        return
     rows = [
         [
             f"{cut.start}-{cut.end}",

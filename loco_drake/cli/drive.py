@@ -1,25 +1,29 @@
 """``loco-drake drive``: a person, a table or a recorded drive steers a robot."""
 
 import hashlib
-import signal
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from loco_drake.cli.options import (
+    LABEL_CHOICES,
     Generator,
+    Html,
     Json,
+    Output,
     Policy,
+    Port,
     Tokenizer,
     Weights,
     option,
 )
-from loco_drake.cli.output import write_json
+from loco_drake.cli.output import do_all, write_json
 from loco_drake.cli.simulation import (
     Pace,
+    Stop,
     check_duration,
     override,
     print_figures,
@@ -33,7 +37,6 @@ from loco_drake.motion.gaits import ANY, ANY_INDEX, GAIT_CHOICES
 if TYPE_CHECKING:
     from loco_drake.control.drive_file import Drive as DriveFile
     from loco_drake.control.driving import OrderTable
-    from loco_drake.systems.meshcat_driver import MeshcatDriver
     from loco_drake.systems.scenario import Scenario
 
 # Seconds that a table of commands is driven on after its last row.
@@ -51,37 +54,46 @@ class Drive:
     """Drive a robot: keys, sliders, buttons and a gamepad on Meshcat's page."""
 
     # Robot: go2 or a1.
-    robot: Annotated[str | None, option(metavar="STR", default="go2")] = None
-    # Gait label at the beginning, such as dog-trot, or any: the gait then goes with the
-    # command.
-    gait: Annotated[str | None, option(metavar="STR", default="any")] = None
-    # Seconds to drive. Default: until it is stopped by Ctrl-C or the page's button;
-    # with --commands, 3 s after the last row; with --replay, as recorded.
-    duration: float | None = None
-    # Seed of the generated motion.
-    seed: Annotated[int | None, option(metavar="INT", default="0")] = None
+    robot: Annotated[str | None, option(metavar="ROBOT", default="go2")] = None
+    gait: Annotated[
+        str | None,
+        option(
+            f"Gait: {LABEL_CHOICES}; or any, which goes with the command. Buttons on "
+            "the page change it.",
+            metavar="GAIT",
+            default="any",
+        ),
+    ] = None
+    # Duration in s.
+    duration: Annotated[
+        float | None,
+        option(
+            default="until Ctrl-C or the page's Stop button; with --commands, 3 s "
+            "after the last row; with --replay, as recorded"
+        ),
+    ] = None
+    # Seed: of the generated motion.
+    seed: Annotated[int | None, option(default="0")] = None
     # Drive by a table of times and commands: CSV that begins with the line
     # time,forward,sideways,yaw_rate and may add the columns gait, push and reset. Units
     # are s, m/s, rad/s and N s to the left.
-    commands: Path | None = None
-    # Record the drive in this file.
-    record: Path | None = None
+    commands: Annotated[Path | None, option(metavar="FILE")] = None
+    # Record to write: the drive, for --replay.
+    record: Annotated[Path | None, option(metavar="FILE"), Output.FILE] = None
     # Repeat a recorded drive to the last bit.
-    replay: Path | None = None
+    replay: Annotated[Path | None, option(metavar="FILE")] = None
     policy: Policy = None
     tokenizer: Tokenizer = None
     generator: Generator = None
     weights: Weights = None
-    # Show the drive in the browser, at most at real-time speed. Needed unless there is
+    # Show the robot in the browser, at most at real-time speed. Needed unless there is
     # a table of commands or a recorded drive.
     meshcat: bool = True
-    # Meshcat's port. Default: a free one, also if the port is in use.
-    port: int | None = None
-    # Save a replay as one HTML page.
-    html: Path | None = None
-    # Scenario in YAML, see loco_drake.systems.scenario.
-    scenario: Annotated[Path | None, option(metavar="PATH")] = None
-    # YAML that overrides fields of the scenario, as in "plant: {friction: 0.5}".
+    port: Port = None
+    html: Html = None
+    # YAML file of a scenario.
+    scenario: Annotated[Path | None, option(metavar="FILE")] = None
+    # YAML that overrides fields of the scenario, as in "plant: {accuracy: 1.0e-4}".
     overlay: Annotated[str | None, option(metavar="TEXT")] = None
     json: Json = None
 
@@ -124,7 +136,11 @@ class Drive:
         # Unless Drake waits.
         waits = self.meshcat and scenario.simulator.target_realtime_rate == 0
         pace = Pace(recorder, waits)
-        with _Stop(driver) as stop, DriveView(recorder, meshcat, driver) as view:
+
+        def pressed() -> bool:
+            return driver is not None and driver.stopped
+
+        with Stop(pressed) as stop, DriveView(recorder, meshcat, driver) as view:
             if steps is None:
                 print("Drive on that page; its Stop button or Ctrl-C ends.", flush=True)
 
@@ -135,36 +151,46 @@ class Drive:
 
             driven = drive(recorder, steps, after_step)
             elapsed = pace.elapsed
-        # First what cannot be had again.
         rollout = driven.rollout
         outcome = {
             "steps": rollout.steps,
             "states_sha256": states_sha256(rollout.state),
         }
-        if self.record is not None:
-            save_drive(self.record, driven.table, **header, **outcome)
-        if meshcat is not None and self.html is not None:
-            meshcat.StopRecording()
-            meshcat.PublishRecording()
-            save_page(meshcat, self.html)
         simulated = rollout.steps * PLAN_DT
-        figures: dict[str, Any] = {
-            "robot": header["robot"],
-            "gait": header["gait"],
-            "seed": header["seed"],
-            "duration_s": simulated if duration is None else duration,
-            "simulated_s": simulated,
-            "fell": rollout.fell,
-            "falls": driven.falls,
-            **tracking_metrics(rollout),
-            **drive_scores(get_robot(header["robot"]), driven),
-            "real_time_factor": simulated / driven.wall,
-            "wall_clock_s": elapsed,
-        }
-        if recorded is not None and rollout.steps == recorded.header["steps"]:
-            figures["identical"] = outcome.items() <= recorded.header.items()
-        print_figures("Drive", figures)
-        write_json(self.json, figures)
+        figures: dict[str, Any] = {}
+
+        def save_record() -> None:
+            if self.record is not None:
+                save_drive(self.record, driven.table, **header, **outcome)
+
+        def report() -> None:
+            figures.update(
+                {
+                    "robot": header["robot"],
+                    "gait": header["gait"],
+                    "seed": header["seed"],
+                    "duration_s": simulated if duration is None else duration,
+                    "simulated_s": simulated,
+                    "fell": rollout.fell,
+                    "falls": driven.falls,
+                    **tracking_metrics(rollout),
+                    **drive_scores(get_robot(header["robot"]), driven),
+                    "real_time_factor": simulated / driven.wall,
+                    "wall_clock_s": elapsed,
+                }
+            )
+            if recorded is not None and rollout.steps == recorded.header["steps"]:
+                figures["identical"] = outcome.items() <= recorded.header.items()
+            print_figures("Drive", figures)
+
+        def save_replay() -> None:
+            if meshcat is not None and self.html is not None:
+                meshcat.StopRecording()
+                meshcat.PublishRecording()
+                save_page(meshcat, self.html)
+
+        # First what cannot be had again.
+        do_all(save_record, report, lambda: write_json(self.json, figures), save_replay)
         if not figures.get("identical", True):
             print(_DIFFERS, file=sys.stderr)
         return 0
@@ -316,30 +342,3 @@ def _header(scenario: "Scenario", recorded: "DriveFile | None") -> dict[str, Any
         "scenario": DumpScenario(scenario),
         **hashes,
     }
-
-
-class _Stop:
-    """Whether a drive is to end: after Ctrl-C, or the button on the page.
-
-    A second Ctrl-C interrupts as usual.
-    """
-
-    def __init__(self, driver: "MeshcatDriver | None") -> None:
-        self._driver = driver
-        self._interrupted = False
-
-    @property
-    def asked(self) -> bool:
-        pressed = self._driver is not None and self._driver.stopped
-        return self._interrupted or pressed
-
-    def __enter__(self) -> Self:
-        self._before = signal.signal(signal.SIGINT, self._interrupt)
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        signal.signal(signal.SIGINT, self._before)
-
-    def _interrupt(self, number: int, frame: object) -> None:
-        self._interrupted = True
-        signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from loco_drake.cli.evaluation import Evaluation, print_report, say_of, trained_on
-from loco_drake.cli.options import Generator, Tokenizer
+from loco_drake.cli.options import Figures, Generator, Tokenizer, option
 from loco_drake.cli.output import print_failed, write_figure
 from loco_drake.evaluation.effort import Effort
 from loco_drake.motion.gaits import LABELS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(kw_only=True)
@@ -33,20 +36,21 @@ class EvaluateGeneration(Effort, Evaluation):
         "all",
     )
 
-    # Score the Motion files in this folder instead of generating motion.
-    motions: Path | None = None
+    # Folder of Motion files: scored instead of generating motion.
+    motions: Annotated[Path | None, option(metavar="DIR")] = None
     tokenizer: Tokenizer = None
     generator: Generator = None
-    # Folder for plots.
-    figures: Path | None = None
-    # Seed of the first motion and the first classifier; it increases by 1 for each
-    # further one.
+    # Folder for pictures: all plots.
+    figures: Figures = None
+    # Seed: of the first motion and the first classifier, and 1 more for each further
+    # one.
     seed: int = 0
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""
         Effort.check(self)
         Evaluation.check(self)
+        self._pictures: dict[str, dict[str, Figure]] = {}
 
     def of_robot(self, name: str) -> dict[str, Any]:
         """Returns the figures of one robot."""
@@ -93,12 +97,16 @@ class EvaluateGeneration(Effort, Evaluation):
         if model is not None:
             figures["validation_trained_on"] = trained_on(paths, recorded, name)
         if self.figures is not None:
-            pictures = generation_figures(
+            self._pictures[name] = generation_figures(
                 robot, recorded, generated.sets[0], recognition
             )
-            for title, picture in pictures.items():
-                write_figure(picture, self.figures / f"{name}-{title}.png")
         return figures
+
+    def draw(self, name: str, figures: dict[str, Any]) -> None:
+        """Writes the pictures of a robot, if they are wanted."""
+        if self.figures is not None:
+            for title, picture in self._pictures.get(name, {}).items():
+                write_figure(picture, self.figures / f"{name}-{title}.png")
 
     def show(self, name: str, figures: dict[str, Any]) -> int:
         """Prints accuracies, figures by label, and all else; returns 0."""

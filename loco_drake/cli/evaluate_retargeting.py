@@ -2,9 +2,10 @@
 
 import time
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from loco_drake.cli.evaluation import Evaluation, print_by_label
+from loco_drake.cli.options import option, some_labels
 from loco_drake.cli.output import MARK, print_failed, print_warnings, tracked
 from loco_drake.common.errors import check_choice
 
@@ -18,14 +19,14 @@ class EvaluateRetargeting(Evaluation):
     """
 
     # Robot: go2, a1, all (both), or a YAML file that describes another robot.
-    robot: str = "go2"
-    # Gait labels, such as dog-trot dog-pace. Default: all in segments.csv.
-    labels: tuple[str, ...] = ()
+    robot: Annotated[str, option(metavar="ROBOT")] = "go2"
+    labels: Annotated[tuple[str, ...], some_labels("all in segments.csv")] = ()
     # Exchange left and right.
     mirror: bool = False
-    # Scale time to keep the animal's Froude number, as `retarget --froude` does.
+    # Scale time to keep the animal's Froude number, v^2 / (g h): as `retarget --froude`
+    # does.
     froude: bool = False
-    # Make motion obey physics, as `retarget --ground` does.
+    # Make motion obey physics: as `retarget --ground` does.
     ground: bool = False
     # Exit with status 1 if a figure of a clip is outside its bounds.
     strict: bool = False

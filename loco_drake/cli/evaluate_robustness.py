@@ -1,11 +1,10 @@
 """The command ``evaluate robustness``."""
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from loco_drake.cli.evaluation import SimulatedEvaluation, print_by_label, say_of
-from loco_drake.cli.options import Policy
+from loco_drake.cli.options import Figures, Policy, TrainedLabels, option
 from loco_drake.cli.output import print_table, tracked, write_figure
 from loco_drake.common.errors import check_choice
 from loco_drake.motion.gaits import parse_label
@@ -19,19 +18,17 @@ if TYPE_CHECKING:
 class EvaluateRobustness(SimulatedEvaluation):
     """Disturb the simulated robot ever more and measure what it survives."""
 
-    # Gait labels, such as dog-trot dog-pace. Default: those that the policy was trained
-    # on.
-    labels: tuple[str, ...] = ()
-    # Disturbances: push, slope, step, friction, payload, latency. Default: all.
-    kinds: tuple[str, ...] = ()
-    # Number of plans per label, each tracked under every disturbance; seeds count up
-    # from --seed.
+    labels: TrainedLabels = ()
+    # Disturbances: push, slope, step, friction, payload, latency.
+    kinds: Annotated[tuple[str, ...], option(metavar="NAME ...", default="all")] = ()
+    # Number of seeds, counted up from --seed: each gives a plan of each label, tracked
+    # under every disturbance.
     seeds: int = 2
-    # Seed of the first plan of each label.
+    # Seed: of the first plan of each label.
     seed: int = 0
     policy: Policy = None
-    # Folder for a picture of the success curves.
-    figures: Path | None = None
+    # Folder for pictures: of the success curves.
+    figures: Figures = None
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""
@@ -84,18 +81,20 @@ class EvaluateRobustness(SimulatedEvaluation):
         }
 
     def show(self, name: str, figures: dict[str, Any]) -> int:
-        """Prints tables of all labels and levels, and draws the curves; returns 0."""
-        from loco_drake.evaluation.report.results import Figures
-        from loco_drake.evaluation.robustness_pictures import (
-            curves_figure,
-            levels_table,
-        )
+        """Prints tables of all labels and levels; returns 0."""
+        from loco_drake.evaluation.robustness_pictures import levels_table
 
         rows = {**figures["labels"], "all of these": figures["all"]}
         print_by_label(f"{name}, disturbed", ["robustness"], rows)
         print_table(f"{name}, success of all gaits", *levels_table(figures["all"]))
+        return 0
+
+    def draw(self, name: str, figures: dict[str, Any]) -> None:
+        """Writes a picture of the curves, if it is wanted."""
+        from loco_drake.evaluation.report.results import Figures
+        from loco_drake.evaluation.robustness_pictures import curves_figure
+
         if self.figures is not None:
             say_of(name)("Drawing")
             picture = curves_figure({name: Figures(figures)})
             write_figure(picture, self.figures / f"{name}-robustness.png")
-        return 0

@@ -1,10 +1,10 @@
 """The command ``evaluate steering``."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from loco_drake.cli.evaluation import SimulatedEvaluation, print_by_label, say_of
+from loco_drake.cli.options import Figures, Policy, TrainedLabels
 from loco_drake.cli.output import print_table, tracked, write_figure
 from loco_drake.common.errors import InputError
 from loco_drake.motion.gaits import parse_label
@@ -57,24 +57,20 @@ def ways_table(figures: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
 class EvaluateSteering(SimulatedEvaluation):
     """Drive the simulated robot by commands and measure how it follows them."""
 
-    # Gait labels, such as dog-trot dog-pace. Default: those that the policy was trained
-    # on.
-    labels: tuple[str, ...] = ()
-    # Number of 60 s drives per label; seeds count up from --seed.
+    labels: TrainedLabels = ()
+    # Number of seeds, counted up from --seed: each gives a drive of 60 s of each label.
     seeds: int = 2
-    # Seed of the first drive, and of the generated motion.
+    # Seed: of the first drive, and of the generated motion.
     seed: int = 0
     # Search for the range of each label; otherwise the published ranges are used.
     search: bool = False
     # Compare bending the plan with telling the generator the command, and with both, in
     # the published ranges and, by a two-sample test, with recordings.
     compare: bool = False
-    # Weights of the policy, or the name of a shipped variant, such as randomized.
-    # Default: the robot's main policy.
-    policy: Path | None = None
+    policy: Policy = None
     # Folder for pictures: errors over the grid; of each gait the response to commands
     # and a figure of eight.
-    figures: Path | None = None
+    figures: Figures = None
 
     def prepare(self, name: str) -> "tuple[Scenario, list[Course]]":
         """Returns what to simulate for a robot."""
@@ -125,7 +121,7 @@ class EvaluateSteering(SimulatedEvaluation):
         return {"robot": name, "labels": labels, "all": overall(labels)}
 
     def show(self, name: str, figures: dict[str, Any]) -> int:
-        """Prints tables of all labels, and draws the pictures; returns 0."""
+        """Prints tables of all labels; returns 0."""
         if self.compare:
             for label, of_label in figures["labels"].items():
                 print_table(f"{name}, {label}", *ways_table(of_label))
@@ -134,8 +130,6 @@ class EvaluateSteering(SimulatedEvaluation):
         print_by_label(f"{name}, steered", ["steering"], rows)
         title = f"{name}, ranges of the commands"
         print_by_label(title, ["steering_range"], figures["labels"])
-        if self.figures is not None:
-            self._draw(self.figures, name, figures)
         return 0
 
     def _compared(
@@ -168,10 +162,13 @@ class EvaluateSteering(SimulatedEvaluation):
             labels[label] = {**figures, "naturalness": natural}
         return {"robot": name, "compare": True, "labels": labels}
 
-    def _draw(self, folder: Path, name: str, figures: dict[str, Any]) -> None:
+    def draw(self, name: str, figures: dict[str, Any]) -> None:
+        """Writes the pictures of a robot, if they are wanted."""
         from loco_drake.evaluation.steering_pictures import steering_figures
 
+        if self.figures is None or self.compare:
+            return
         say_of(name)("Drawing")
         scenario = self._scenario(name, next(iter(figures["labels"])))
         for title, picture in steering_figures(scenario, figures, self.seed):
-            write_figure(picture, folder / f"{name}-{title}.png")
+            write_figure(picture, self.figures / f"{name}-{title}.png")

@@ -1,13 +1,15 @@
 """The command ``evaluate tokenizer``."""
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from loco_drake.cli.evaluation import Evaluation, print_report, trained_on
-from loco_drake.cli.options import Tokenizer
+from loco_drake.cli.options import Figures, Tokenizer, option
 from loco_drake.cli.output import print_failed, write_figure
 from loco_drake.common.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(kw_only=True)
@@ -21,10 +23,10 @@ class EvaluateTokenizer(Evaluation):
     KEYS = ("labels", "all", "codebook_use")
 
     tokenizer: Tokenizer = None
-    # Number of codebooks to decode from, the coarsest first. Default: all.
-    books: int | None = None
-    # Folder for a plot of codebook usage.
-    figures: Path | None = None
+    # Number of codebooks, the coarsest first: to decode from.
+    books: Annotated[int | None, option(default="all")] = None
+    # Folder for pictures: of codebook usage.
+    figures: Figures = None
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""
@@ -32,6 +34,7 @@ class EvaluateTokenizer(Evaluation):
         from loco_drake.models.shipped import pretrained_path
 
         super().check()
+        self._pictures: dict[str, Figure] = {}
         self._path = self.tokenizer or pretrained_path("tokenizer")
         self._tokenizer = load_tokenizer(self._path)
         books = self._tokenizer.config.codebooks
@@ -61,9 +64,13 @@ class EvaluateTokenizer(Evaluation):
         figures, counts = evaluate_tokenizer(self._tokenizer, recorded, self.books)
         if self.figures is not None:
             title = f"{name}: {figures['codebook_use']:.0%} of the codes are used"
-            picture = code_use_figure(counts, title)
-            write_figure(picture, self.figures / f"{name}-codes.png")
+            self._pictures[name] = code_use_figure(counts, title)
         return {**figures, "validation_trained_on": seen}
+
+    def draw(self, name: str, figures: dict[str, Any]) -> None:
+        """Writes the picture of a robot, if it is wanted."""
+        if self.figures is not None and name in self._pictures:
+            write_figure(self._pictures[name], self.figures / f"{name}-codes.png")
 
     def show(self, name: str, figures: dict[str, Any]) -> int:
         """Prints a table of all labels; returns 0."""

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from loco_drake.cli.evaluation import SimulatedEvaluation, print_by_label
-from loco_drake.cli.options import Policy, option
+from loco_drake.cli.options import Policy, TrainedLabels, option
 from loco_drake.cli.output import tracked
 from loco_drake.common.errors import InputError, check_choice
 from loco_drake.motion.gaits import any_label, parse_label
@@ -22,23 +22,22 @@ if TYPE_CHECKING:
 class EvaluateTracking(SimulatedEvaluation):
     """Simulate many episodes and measure how well a policy tracks its references."""
 
-    # Gait labels, such as dog-trot dog-pace. Default: those that the policy was trained
-    # on.
-    labels: tuple[str, ...] = ()
-    # generated, during the simulation; retargeted, from stretches of the recordings; or
-    # grounded, from these made to obey physics.
-    reference: str = "generated"
-    # Number of episodes per label, at most; seeds count up from --seed.
+    labels: TrainedLabels = ()
+    # What is tracked: generated, during the simulation; retargeted, from stretches of
+    # the recordings; or grounded, from these made to obey physics.
+    reference: Annotated[str, option(metavar="NAME")] = "generated"
+    # Number of seeds, counted up from --seed: each gives an episode of each label; of
+    # recordings, there are at most as many as they are.
     seeds: int = 20
-    # Length of each episode in s; at most the length of a recording.
+    # Duration in s: of each episode, at most that of a recording.
     duration: float = 10.0
     policy: Policy = None
-    # drake, or mujoco, which needs the extra 'mujoco'; see docs/mujoco.md.
-    simulator: str = "drake"
+    # Simulator: drake, or mujoco, which needs the extra 'mujoco'; see docs/mujoco.md.
+    simulator: Annotated[str, option(metavar="NAME")] = "drake"
     # With --simulator mujoco: MJCF file of another model of the robot.
-    mjcf: Path | None = None
-    # Contact solver of Drake: similar, lagged, sap or cenic.
-    contact: str = "similar"
+    mjcf: Annotated[Path | None, option(name="mujoco-model", metavar="FILE")] = None
+    # Contact solver: similar, lagged, sap or cenic. They are Drake's.
+    contact: Annotated[str, option(metavar="NAME")] = "similar"
     time_step: Annotated[
         float | None,
         option("Time step of the physics, s.", default="0.01; with mujoco 0.002"),
@@ -49,16 +48,16 @@ class EvaluateTracking(SimulatedEvaluation):
     friction: float = 0.8
     # Push the trunk repeatedly in random directions.
     pushes: bool = False
-    # With --pushes: change of the robot's velocity by one push, m/s. The force lasts .1
-    # s.
+    # Change of the robot's velocity by one push, m/s: with --pushes. The force lasts a
+    # tenth of a second.
     push_size: float = 1.0
-    # With --pushes: time from the start to the first push and between pushes, s.
+    # Time from the start to the first push and between pushes, s: with --pushes.
     push_interval: float = 2.0
-    # Randomize the world of each episode, as `train tracker --randomize` does.
+    # Randomize the world of each episode: as `train tracker --randomize` does.
     randomize: bool = False
     # Ranges of single parts; a range is two numbers.
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
-    # Seed of the first generated reference of each label.
+    # Seed: of the first generated reference of each label.
     seed: int = 0
 
     def check(self) -> None:
@@ -83,7 +82,7 @@ class EvaluateTracking(SimulatedEvaluation):
         if self.simulator == "mujoco":
             self._mujoco().check()
         elif self.mjcf is not None:
-            raise InputError("--mjcf is a model for MuJoCo: add --simulator mujoco.")
+            raise InputError("--mujoco-model is for MuJoCo: add --simulator mujoco.")
 
     def _mujoco(self) -> "MujocoConfig":
         """Returns the configuration of MuJoCo."""

@@ -2,11 +2,19 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from loco_drake.cli.options import DataDir, Json, UnusedSeed
-from loco_drake.cli.output import print_failed, print_table, say, write_results
+from loco_drake.cli.options import (
+    DataDir,
+    Json,
+    UnusedSeed,
+    Workers,
+    option,
+    some_labels,
+)
+from loco_drake.cli.output import do_all, print_failed, print_table, say, write_results
 from loco_drake.common.errors import InputError, check_at_least, check_choice, one_line
 from loco_drake.motion.gaits import parse_label
 
@@ -23,25 +31,36 @@ class Evaluation:
     KEYS: ClassVar[tuple[str, ...]]
 
     # Robot: go2, a1 or all.
-    robot: str = "go2"
-    # Gait labels, such as dog-trot dog-pace. Default: all of the fifteen with
-    # recordings.
-    labels: tuple[str, ...] = ()
+    robot: Annotated[str, option(metavar="ROBOT")] = "go2"
+    labels: Annotated[tuple[str, ...], some_labels("all with recordings")] = ()
     data_dir: DataDir = None
-    # Number of worker processes.
-    workers: int = 1
-    # Accepted by every evaluation; this one is deterministic.
+    workers: Workers = 1
+    # Number of seeds, counted up from --seed: accepted by every evaluation; this one is
+    # deterministic.
     seeds: int = 1
     seed: UnusedSeed = 0
     json: Json = None
 
     def run(self) -> int:
-        """Prints tables and writes the figures; returns the exit status."""
+        """Prints tables, writes the figures and draws; returns the exit status."""
         self.check()
         result = self.of_robots(self.robots())
-        write_results(self.json, result)
         robots = result.get("robots", {self.robot: result})
-        return max(self.show(name, figures) for name, figures in robots.items())
+        statuses = []
+
+        def show() -> None:
+            for name, figures in robots.items():
+                statuses.append(self.show(name, figures))
+
+        do_all(
+            show,
+            lambda: write_results(self.json, result),
+            *(partial(self.draw, *item) for item in robots.items()),
+        )
+        return max(statuses)
+
+    def draw(self, name: str, figures: dict[str, Any]) -> None:
+        """Writes the pictures of a robot, if there are any."""
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""

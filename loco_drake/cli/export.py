@@ -4,13 +4,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from loco_drake.cli.options import Policy, option
-from loco_drake.cli.output import print_table, write_json
+from loco_drake.cli.options import (
+    SCHEDULE,
+    Json,
+    Output,
+    Policy,
+    Robot,
+    option,
+)
+from loco_drake.cli.output import do_all, print_table, write_json
 from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.motion.gaits import parse_schedule
 
 if TYPE_CHECKING:
-    from loco_drake.models.robots import Robot
+    from loco_drake.models.robots import Robot as RobotModel
 
 
 @dataclass(kw_only=True)
@@ -18,31 +25,35 @@ class Export:
     """Write a policy, a plan for it and the robot's model for use without Drake.
 
     The policy is ONNX, from raw observations to actions, with metadata. With --plans or
-    --mjcf a policy is written only with --out. See docs/deploy.md.
+    --mjcf a policy is written only with --onnx. The figures are its metadata. See
+    docs/deploy.md.
     """
 
-    # Robot: go2 or a1.
-    robot: str = "go2"
+    robot: Robot = "go2"
     policy: Policy = None
     out: Annotated[
         Path | None,
         option(
-            "ONNX file to write.", default="policy.onnx; with --plans or --mjcf none"
+            "ONNX file to write: the policy.",
+            name="onnx",
+            metavar="FILE",
+            default="policy.onnx; with --plans or --mjcf none",
         ),
+        Output.FILE,
     ] = None
     # NumPy file (.npz) to write: generated motion, re-timed within the joints' limits,
     # and the set-points that follow it.
-    plans: Path | None = None
-    # With --plans: gait label, such as dog-trot, or a schedule of labels with start
-    # times in s, such as dog-pace,dog-trot@3.
-    gait: Annotated[str | None, option(metavar="STR", default="dog-trot")] = None
-    # With --plans: seconds of motion, at most 600.
-    duration: Annotated[float | None, option(metavar="FLOAT", default="10.0")] = None
+    plans: Annotated[Path | None, option(metavar="FILE"), Output.FILE] = None
+    gait: Annotated[
+        str | None,
+        option(f"{SCHEDULE}. Goes with --plans.", metavar="GAIT", default="dog-trot"),
+    ] = None
+    # Duration in s: of the plan, at most 600.
+    duration: Annotated[float | None, option(default="10.0")] = None
     # MJCF file to write: bodies, limits, contacts and PD of the robot, for MuJoCo.
-    mjcf: Path | None = None
-    # Write the policy's metadata to this JSON file.
-    json: Path | None = None
-    # With --plans: seed of the generated motion.
+    mjcf: Annotated[Path | None, option(metavar="FILE"), Output.FILE] = None
+    json: Json = None
+    # Seed: of the plan's motion.
     seed: int = 0
 
     def run(self) -> int:
@@ -64,7 +75,7 @@ class Export:
     def _check(self, out: Path | None) -> None:
         """Raises InputError if an option is wrong."""
         for name, path, suffix in (
-            ("out", out, ".onnx"),
+            ("onnx", out, ".onnx"),
             ("plans", self.plans, ".npz"),
             ("mjcf", self.mjcf, ".xml"),
         ):
@@ -75,7 +86,7 @@ class Export:
         if self.plans is not None:
             self._check_plan()
         if out is None and (self.json or self.policy):
-            raise InputError("--json and --policy are of a policy: add --out.")
+            raise InputError("--json and --policy are of a policy: add --onnx.")
 
     def _check_plan(self) -> None:
         from loco_drake.generation.generate import check_duration
@@ -88,19 +99,23 @@ class Export:
         parse_schedule(self.gait).check_ends_by(self.duration)
         check_at_least("seed", self.seed, 0)
 
-    def _write_policy(self, robot: "Robot", out: Path) -> None:
+    def _write_policy(self, robot: "RobotModel", out: Path) -> None:
         from loco_drake.control.actor import load_actor
         from loco_drake.models.shipped import policy_path
         from loco_drake.tracking.onnx_policy import export_onnx
 
         actor = load_actor(policy_path(robot, self.policy), robot)
         metadata = export_onnx(actor, robot, out)
-        write_json(self.json, metadata)
         shown = [(name, metadata[name]) for name in ("robot", "labels", "rate")]
         size = f"{out.stat().st_size / 1e3:.0f} kB"
-        print_table(str(out), ("of the policy", ""), [*shown, ("size", size)])
+        do_all(
+            lambda: print_table(
+                str(out), ("of the policy", ""), [*shown, ("size", size)]
+            ),
+            lambda: write_json(self.json, metadata),
+        )
 
-    def _write_plan(self, robot: "Robot", path: Path) -> None:
+    def _write_plan(self, robot: "RobotModel", path: Path) -> None:
         from loco_drake.control.plan_file import save_plan
         from loco_drake.systems.plan_recorder import PlanRecorder
         from loco_drake.systems.scenario import GeneratedReference, Scenario
@@ -121,7 +136,7 @@ class Export:
         ]
         print_table(str(path), ("of the plan", ""), rows)
 
-    def _write_mjcf(self, robot: "Robot", path: Path) -> None:
+    def _write_mjcf(self, robot: "RobotModel", path: Path) -> None:
         from loco_drake.common.files import atomic_path
         from loco_drake.models.mjcf import robot_mjcf
 

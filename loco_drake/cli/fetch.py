@@ -3,14 +3,14 @@
 import re
 import sys
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from rich.console import Console
 from rich.progress import DownloadColumn, Progress
 
-from loco_drake.cli.options import DataDir, Json, UnusedSeed
-from loco_drake.cli.output import print_table, write_json
+from loco_drake.cli.options import SOURCES, DataDir, Json, UnusedSeed, option
+from loco_drake.cli.output import do_all, print_table, write_json
 from loco_drake.common.errors import InputError, check_choice
 
 if TYPE_CHECKING:
@@ -35,12 +35,20 @@ class DataFetch:
     shipped rows to segments.csv and keeps your own.
     """
 
-    # Sources to download, such as dog. Default: all.
-    source: tyro.conf.UseAppendAction[tuple[tuple[str, ...], ...]] = ()
+    source: Annotated[
+        tuple[tuple[str, ...], ...],
+        tyro.conf.UseAppendAction,
+        option(
+            f"{SOURCES}; several may be named.", metavar="SOURCE ...", default="all"
+        ),
+    ] = ()
     data_dir: DataDir = None
     # Download from a copy: a folder or an http(s) address with the layout of the data
     # folder.
-    mirror: str | None = None
+    mirror: Annotated[
+        str | None,
+        option(name="from", metavar="DIR|URL", default="from the publishers"),
+    ] = None
     json: Json = None
     seed: UnusedSeed = 0
 
@@ -92,16 +100,18 @@ class DataFetch:
                 "licence": DATASETS[source].licence,
                 "attribution": DATASETS[source].attribution,
             }
-        write_json(self.json, figures)
         here, fetched = len(names) - len(to_fetch), len(to_fetch) - len(failed)
         told = f"{fetched} fetched, {here} already there"
-        print(f"{len(present)} files in {folder}: {told}")
         lines = [f"Failed: {name} {error}" for name, error in failed.items()]
         if (more := len(lines) - _LISTED_FAILURES) > 0:
             lines[_LISTED_FAILURES:] = [f"Failed: {more} more files"]
         if failed:
             lines.append("The same command again fetches only what is missing.")
-            print("\n".join(lines), file=sys.stderr)
+        do_all(
+            lambda: print(f"{len(present)} files in {folder}: {told}"),
+            lambda: print("\n".join(lines), end="\n" * bool(lines), file=sys.stderr),
+            lambda: write_json(self.json, figures),
+        )
         return 1 if failed else 0
 
 

@@ -3,9 +3,19 @@
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from loco_drake.cli.options import Generator, Json, Tokenizer, Weights
-from loco_drake.cli.output import print_table, write_json
+from loco_drake.cli.options import (
+    SCHEDULE,
+    Generator,
+    Json,
+    OutFolder,
+    Robot,
+    Tokenizer,
+    Weights,
+    option,
+)
+from loco_drake.cli.output import do_all, print_table, write_json
 from loco_drake.common.errors import check_at_least, check_choice
 from loco_drake.motion.gaits import parse_schedule
 from loco_drake.motion.motion import FPS
@@ -18,30 +28,30 @@ BATCH = 32  # motions side by side
 class Generate:
     """Generate motion of a gait and write Motion files at 50 frames/s."""
 
-    # Gait label, such as dog-pace, or a schedule of labels with start times in s, such
-    # as dog-pace,dog-trot@3,dog-gallop@6.
-    gait: str = "dog-trot"
-    # Length of each motion in s, above 0 and at most 600.
+    gait: Annotated[str, option(f"{SCHEDULE}.", metavar="GAIT")] = "dog-trot"
+    # Duration in s: of each motion, above 0 and at most 600.
     duration: float = 10.0
     # Number of motions.
     count: int = 1
-    # Seed of the first motion; it increases by 1 for each further motion.
+    # Seed: of the first motion, and 1 more of each further one.
     seed: int = 0
-    # Robot: go2 or a1.
-    robot: str = "go2"
-    # Folder for the Motion files.
-    out: Path = Path("motions/generated")
-    # Speed rank, from 0 (slowest recorded speed of the gait) to 1 (fastest). Default:
-    # drawn for each seed.
-    pace: float | None = None
+    robot: Robot = "go2"
+    # Folder to write to: the Motion files.
+    out: OutFolder = Path("motions/generated")
+    # Speed rank, from 0 (slowest recorded speed of the gait) to 1 (fastest).
+    pace: Annotated[
+        float | None, option(name="speed-rank", default="drawn for each seed")
+    ] = None
     # Velocity that the generator is told: forward, sideways m/s and yaw rate rad/s, in
     # the heading frame; the nearest that was recorded of the gait is told.
-    tell: tuple[float, float, float] | None = None
+    tell: Annotated[tuple[float, float, float] | None, option(metavar="VX VY WZ")] = (
+        None
+    )
     # Steer each motion by commands drawn every 2 s: along another path, sideways,
     # faster, slower and backwards, see docs/driving.md.
     steer: bool = False
-    # Move the trunk until the feet's forces explain its motion, as `retarget --ground`
-    # does; some ms a frame.
+    # Make motion obey physics: move the trunk until the feet's forces explain its
+    # motion, as `retarget --ground` does; some ms a frame.
     ground: bool = False
     # Sampling temperature: above 1 more varied, below 1 more typical, 0 greedy.
     temperature: float = 1.0
@@ -58,7 +68,7 @@ class Generate:
         from loco_drake.generation import generate
         from loco_drake.generation.motion_model import motion_model_of
         from loco_drake.models.robots import ROBOTS
-        from loco_drake.models.shipped import weights_in
+        from loco_drake.models.shipped import chosen_weights
         from loco_drake.retargeting.grounding import ground
         from loco_drake.retargeting.inverse_kinematics import LegSolver
 
@@ -71,12 +81,10 @@ class Generate:
         check_choice("robot", self.robot, ROBOTS)
         check_at_least("count", self.count, 1)
         check_at_least("seed", self.seed, 0)
-        found = weights_in(self.weights) if self.weights is not None else {}
-        model = motion_model_of(
-            self.robot,
-            self.tokenizer or found.get("tokenizer"),
-            self.generator or found.get("generator"),
+        found = chosen_weights(
+            self.weights, tokenizer=self.tokenizer, generator=self.generator
         )
+        model = motion_model_of(self.robot, found["tokenizer"], found["generator"])
         solver = LegSolver(model.robot, FPS) if self.ground else None
         seconds, frames = 0.0, 0
         for first in range(self.seed, self.seed + self.count, BATCH):
@@ -106,10 +114,12 @@ class Generate:
             "tokens_per_second": frames / model.frames_per_token / seconds,
             "times_real_time": frames / FPS / seconds,
         }
-        write_json(self.json, figures)
-        print_table(
-            f"{self.count} motions of {self.duration:g} s in {self.out}",
-            ["figure", "value"],
-            [[key.replace("_", " "), f"{value:.4g}"] for key, value in figures.items()],
+        rows = [
+            [key.replace("_", " "), f"{value:.4g}"] for key, value in figures.items()
+        ]
+        title = f"{self.count} motions of {self.duration:g} s in {self.out}"
+        do_all(
+            lambda: print_table(title, ["figure", "value"], rows),
+            lambda: write_json(self.json, figures),
         )
         return 0

@@ -5,14 +5,15 @@ import sys
 from importlib import import_module
 from typing import Any
 
-import tyro
 from rich.console import Console
 from rich.table import Table
 
 from loco_drake import __version__
+from loco_drake.cli.options import Output, outputs
+from loco_drake.cli.output import check_output
+from loco_drake.cli.parsing import parse
 from loco_drake.common.determinism import use_one_thread
 from loco_drake.common.errors import InputError, check_choice, one_line
-from loco_drake.common.files import check_writable
 
 # What each command does.
 _COMMANDS = {
@@ -49,9 +50,6 @@ _MODULES = {
     "runs list": "runs",
 }
 _HELP = ("-h", "--help")
-# Options that name an output. Whether it is writable is checked before the work.
-_OUTPUTS = ("json", "html", "video", "out", "figures", "record", "plans")
-_ONE_FILE = ("report", "export", "data inspect")  # --out is a file
 # Libraries that Drake needs and a bare Debian or Ubuntu lacks.
 _LIBRARIES = "libx11-6 libsm6 libglib2.0-0"
 
@@ -109,16 +107,14 @@ def _run(arguments: list[str]) -> int:
     # Lower levels tell of harmless properties of models. Importing Drake resets the
     # level, but no filter.
     logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.ERROR)
-    prog = f"loco-drake {name}"
-    parsed: Any = tyro.cli(command, prog=prog, args=rest)
-    for option in _OUTPUTS:
-        into = option == "figures" or (option == "out" and name not in _ONE_FILE)
-        check_writable(getattr(parsed, option, None), folder=into)
+    parsed: Any = parse(command, name, rest)
+    for option, kind in outputs(command).items():
+        check_output(getattr(parsed, option), folder=kind is Output.FOLDER)
     # A recipe's options are in its folder, not in one checkpoint.
     if getattr(parsed, "resume", False) and name != "train recipe":
         from loco_drake.cli.training import parse_resumed
 
-        parsed = parse_resumed(parsed, prog, rest)
+        parsed = parse_resumed(parsed, name, rest)
     status: int = parsed.run()
     return status
 

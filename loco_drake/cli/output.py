@@ -1,7 +1,7 @@
 """Output of commands: tables for people, JSON for programs."""
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -12,13 +12,50 @@ from rich.table import Table
 from rich.text import Text
 
 from loco_drake.common import files
-from loco_drake.common.errors import one_line
-from loco_drake.common.files import atomic_path, figures_sha256
+from loco_drake.common.errors import InputError, one_line
+from loco_drake.common.files import atomic_path, check_writable, figures_sha256
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Item = TypeVar("Item")
+
+
+def check_output(path: Path | None, *, folder: bool = False) -> None:
+    """Checks before any work whether an output, if any, can be written.
+
+    Args:
+        path: of the file, or of the folder for files.
+        folder: whether it is a folder.
+
+    Raises:
+        InputError: if it cannot.
+    """
+    try:
+        check_writable(path, folder=folder)
+    except OSError as error:
+        reason = f"{error.strerror}: {error.filename}"
+        raise InputError(f"{str(path)!r} cannot be written: {reason}.") from None
+
+
+def do_all(*steps: Callable[[], object]) -> None:
+    """Does all steps at the end of work, such as to print and to save figures.
+
+    A full disk or a closed pipe at one of them keeps none of the others.
+
+    Raises:
+        OSError: the first of the steps, after all of them.
+    """
+    errors = []
+    for step in steps:
+        try:
+            step()
+            # Before JSON that goes to /dev/stdout, which has no buffer.
+            sys.stdout.flush()
+        except OSError as error:
+            errors.append(error)
+    if errors:
+        raise errors[0]
 
 
 def write_json(path: Path | None, figures: dict[str, Any]) -> None:

@@ -3,12 +3,20 @@
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from loco_drake.cli.options import DataDir, Json, UnusedSeed
-from loco_drake.cli.output import print_table, say, write_json
+from loco_drake.cli.options import (
+    DataDir,
+    Html,
+    Json,
+    Port,
+    UnusedSeed,
+    Video,
+    option,
+)
+from loco_drake.cli.output import do_all, print_table, say, write_json
 from loco_drake.cli.simulation import save_page, start_meshcat
 from loco_drake.cli.video import make_video, prepare_video
 from loco_drake.common.errors import InputError, one_line
@@ -31,28 +39,28 @@ _PERIOD = 1 / 50  # s between looks at the controls
 class Play:
     """Show Motion files in the browser, on a page or in a video, without physics.
 
-    They are shown one after another, over and over, until Ctrl-C or the page's button.
+    They are shown one after another, over and over, until Ctrl-C or the page's button;
+    with --html or --video, files are written instead.
     Space pauses, left and right step by a frame, up and down by a file; a slider goes
     to any frame.
     """
 
     # Motion files.
-    files: tyro.conf.Positional[tuple[Path, ...]]
-    # YAML file of a robot that motion is of, such as examples/solo8.yaml, besides go2
-    # and a1; may be repeated.
-    robot: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    files: Annotated[tuple[Path, ...], tyro.conf.Positional, option(metavar="FILE ...")]
+    # Robot: the YAML file of one that motion is of, such as examples/solo8.yaml; may be
+    # repeated. go2 and a1 are known.
+    robot: Annotated[
+        tuple[str, ...], tyro.conf.UseAppendAction, option(metavar="ROBOT")
+    ] = ()
     # Show all files at the same time.
     side_by_side: bool = False
     # Show to the left of each robot the keypoints that it was retargeted from, in its
     # size, where the recording is in the data folder.
-    source: bool = False
+    source: Annotated[bool, option(name="keypoints")] = False
     data_dir: DataDir = None
-    # Meshcat's port. Default: a free one, also if the port is in use.
-    port: int | None = None
-    # Save a replay as one HTML page, instead of waiting.
-    html: Path | None = None
-    # Save a video, instead of waiting: *.mp4, *.webp or *.gif.
-    video: Path | None = None
+    port: Port = None
+    html: Html = None
+    video: Video = None
     json: Json = None
     seed: UnusedSeed = 0
 
@@ -67,12 +75,11 @@ class Play:
         if self.video is not None:
             prepare_video(self.video, seconds)
         live = self.html is None and self.video is None
-        write_json(self.json, {"files": rows, "seconds": seconds})
         columns = ("file", "robot", "label", "frames", "seconds")
-        print_table(
-            f"Motion files: {len(rows)}",
-            columns,
-            [[_cell(row[name]) for name in columns] for row in rows],
+        cells = [[_cell(row[name]) for name in columns] for row in rows]
+        do_all(
+            lambda: print_table(f"Motion files: {len(rows)}", columns, cells),
+            lambda: write_json(self.json, {"files": rows, "seconds": seconds}),
         )
         if live or self.html is not None:
             meshcat = start_meshcat(self.port, announce=live)

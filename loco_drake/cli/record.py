@@ -2,12 +2,11 @@
 
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from loco_drake.cli import output
-from loco_drake.cli.options import Json, Policy, option
+from loco_drake.cli.options import Json, Motions, OutFolder, Policy, Robot
 from loco_drake.common.errors import (
-    InputError,
     check_at_least,
     check_bounds,
     check_choice,
@@ -15,7 +14,7 @@ from loco_drake.common.errors import (
 
 if TYPE_CHECKING:
     from loco_drake.control.actor import Actor
-    from loco_drake.models.robots import Robot
+    from loco_drake.models.robots import Robot as RobotModel
     from loco_drake.motion.motion import Motion
     from loco_drake.retargeting.inverse_kinematics import LegSolver
 
@@ -29,22 +28,21 @@ class Record:
     are left out.
     """
 
-    # Folder of Motion files to track.
-    references: Annotated[Path, option(metavar="PATH")]
-    # Robot: go2 or a1.
-    robot: str = "go2"
+    # Folder of Motion files: those to track.
+    references: Motions
+    robot: Robot = "go2"
     policy: Policy = None
-    # Folder for the Motion files, which are named like their references.
-    out: Path = Path("motions/recorded")
+    # Folder to write to: the Motion files, named like those tracked.
+    out: OutFolder = Path("motions/recorded")
     # Number of attempts at each motion, of which the best is written.
     attempts: int = 4
     # Normalized return of 100 below which a motion is left out.
     least_return: float = 75.0
-    # Move the trunk afterwards as `retarget --ground` does: the planned contacts are
-    # kept, which a robot in simulation only nearly follows.
+    # Make motion obey physics: move the trunk afterwards as `retarget --ground` does.
+    # The planned contacts are kept, which a robot in simulation only nearly follows.
     ground: bool = True
     json: Json = None
-    # Seed of the attempts.
+    # Seed: of the attempts.
     seed: int = 0
 
     def run(self) -> int:
@@ -54,41 +52,41 @@ class Record:
         from loco_drake.models.robots import ROBOTS, get_robot
         from loco_drake.models.shipped import policy_path
         from loco_drake.motion.motion import FPS
-        from loco_drake.motion.motion_file import load_motion
         from loco_drake.retargeting.inverse_kinematics import LegSolver
+        from loco_drake.tracking.references import read_motions
 
         check_choice("robot", self.robot, ROBOTS)
         check_at_least("attempts", self.attempts, 1)
         check_at_least("seed", self.seed, 0)
         check_bounds("--least-return", self.least_return, 0, 100)
-        paths = sorted(self.references.glob("*.npz"))
-        if not paths:
-            raise InputError(
-                f"There are no Motion files (*.npz) in {str(self.references)!r}."
-            )
         robot = get_robot(self.robot)
+        motions = read_motions(robot, self.references)
         actor = load_actor(policy_path(robot, self.policy), robot)
         solver = LegSolver(robot, FPS)
         figures = {}
         with single_thread():
-            for path in output.tracked(paths, "Recording", len(paths)):
-                motion = load_motion(path)
+            for path in output.tracked(motions, "Recording", len(motions)):
+                motion = motions[path]
                 figures[path.stem] = self._one(path, motion, robot, actor, solver)
         written = {k: f for k, f in figures.items() if f["written"]}
-        output.write_json(self.json, figures)
         rows = [
             [k, f"{f['normalized_return']:.1f}", f"{f['momentum_error']:.3f}"]
             for k, f in written.items()
         ]
-        title = f"Motion files in {self.out}: {len(rows)} of {len(paths)}"
-        output.print_table(title, ["motion", "return", "momentum error"], rows)
+        title = f"Motion files in {self.out}: {len(rows)} of {len(motions)}"
+        output.do_all(
+            lambda: output.print_table(
+                title, ["motion", "return", "momentum error"], rows
+            ),
+            lambda: output.write_json(self.json, figures),
+        )
         return 0 if rows else 1
 
     def _one(
         self,
         path: Path,
         motion: "Motion",
-        robot: "Robot",
+        robot: "RobotModel",
         actor: "Actor",
         solver: "LegSolver",
     ) -> dict[str, Any]:

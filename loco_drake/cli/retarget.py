@@ -3,12 +3,23 @@
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from loco_drake.cli import output
-from loco_drake.cli.options import DataDir, Json
+from loco_drake.cli.options import (
+    GAIT_CHOICES,
+    SOURCES,
+    DataDir,
+    End,
+    Fps,
+    Json,
+    Output,
+    Start,
+    Workers,
+    option,
+)
 from loco_drake.cli.output import MARK, print_table
 from loco_drake.common.errors import InputError, check_at_least, check_choice
 from loco_drake.motion.gaits import LABELS
@@ -32,47 +43,63 @@ class Retarget:
     """
 
     # A recording; needs --source and --gait.
-    file: tyro.conf.Positional[Path | None] = None
-    # Source of the recordings: dog, horse, mpc, solo8, or a YAML file that names the
-    # joints of another animal's, see docs/own_animal.md. Default: all.
-    source: str | None = None
-    # Gait, such as trot; may be repeated. Default: the gaits of the fifteen labels.
-    gait: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    file: Annotated[Path | None, tyro.conf.Positional, option(metavar="[FILE]")] = None
+    source: Annotated[
+        str | None,
+        option(
+            f"{SOURCES}; or a YAML file that names the joints of another animal's, see "
+            "docs/own_animal.md.",
+            metavar="SOURCE",
+            default="all",
+        ),
+    ] = None
+    gait: Annotated[
+        tuple[str, ...],
+        tyro.conf.UseAppendAction,
+        option(
+            f"Gait: {GAIT_CHOICES}, or one's own name of another; may be repeated.",
+            metavar="GAIT",
+            default="the gaits of the fifteen labels",
+        ),
+    ] = ()
     # Robot: go2, a1, or a YAML file that describes another robot, such as
     # examples/solo8.yaml; see docs/retargeting.md.
-    robot: str = "go2"
-    # First frame of FILE, counted from 0 at the file's rate. Default: the first usable
-    # one.
-    start: int | None = None
-    # End frame of FILE, exclusive. Default: the end of the file.
-    end: int | None = None
-    # Rate of FILE in frames/s. Default: inferred from format, name or motion.
-    fps: float | None = None
+    robot: Annotated[str, option(metavar="ROBOT")] = "go2"
+    start: Start = None
+    end: End = None
+    fps: Fps = None
     # Exchange left and right.
     mirror: bool = False
     # Scale time to keep the animal's Froude number, v^2 / (g h): a robot a quarter as
-    # high as the animal moves in half the time. Default: keep the animal's timing.
+    # high as the animal moves in half the time.
     froude: bool = False
-    # Move the trunk, by some mm and degrees, so that the feet's forces can explain its
-    # motion: in flight it falls, on the ground friction suffices. For go2 and a1.
+    # Make motion obey physics: move the trunk, by some mm and degrees, so that the
+    # feet's forces can explain its motion. In flight it falls, on the ground friction
+    # suffices. For go2 and a1.
     ground: bool = False
-    # Folder for the Motion files. Default: motions/ROBOT, with the suffixes -mirrored
-    # and -froude and -grounded for these options.
-    out: Path | None = None
-    # Number of 2 s trajectories for each of the fifteen labels, at most; 0 for none.
-    # None are cut with FILE.
+    # Folder to write to: the Motion files.
+    out: Annotated[
+        Path | None,
+        option(
+            metavar="DIR",
+            default="motions/ROBOT, with the suffixes -mirrored and -froude and "
+            "-grounded for these options",
+        ),
+        Output.FOLDER,
+    ] = None
+    # Number of trajectories of 2 s for each of the fifteen labels; at most, 0 for none.
+    # With FILE, there are none.
     trajectories: int = 10
-    # Number of steered variants to write of each stretch, besides itself: along other
-    # paths, sideways, faster, slower and backwards, see docs/driving.md. None of a
-    # stretch that is held out for validation.
-    steer: int = 0
-    # Number of worker processes.
-    workers: int = 1
+    # Number of steered variants of each stretch, besides itself: along other paths,
+    # sideways, faster, slower and backwards, see docs/driving.md. Stretches that are
+    # held out for validation have none.
+    steer: Annotated[int, option(name="steered")] = 0
+    workers: Workers = 1
     data_dir: DataDir = None
     # Exit with status 1 if a figure of a clip is outside its bounds.
     strict: bool = False
     json: Json = None
-    # Seed of the split and of the choice of trajectories.
+    # Seed: of the split and of the choice of trajectories.
     seed: int = 0
 
     def run(self) -> int:
@@ -89,7 +116,7 @@ class Retarget:
         robot = load_robot(self.robot)
         check_at_least("trajectories", self.trajectories, 0)
         check_at_least("workers", self.workers, 1)
-        check_at_least("steer", self.steer, 0)
+        check_at_least("steered", self.steer, 0)
         if self.steer:
             check_choice("robot to steer", robot.name, ROBOTS)
         if self.ground:
@@ -98,12 +125,12 @@ class Retarget:
         segments, split = self._segments(source)
         variant = Variant(mirror=self.mirror, froude=self.froude, ground=self.ground)
         out = self.out or Path("motions") / f"{robot.name}{variant.suffix}"
+        output.check_output(out, folder=True)
         done = retarget_segments(segments, robot, out, split, self.workers, variant)
         outcomes = list(output.tracked(done, "Retargeting", len(segments)))
         failed = [outcome for outcome in outcomes if outcome.error is not None]
         if self.file is not None and failed:
             raise InputError(str(failed[0].error))
-        output.write_json(self.json, {o.segment.name: _figures(o) for o in outcomes})
         reports = {o.segment.name: o.report for o in outcomes if o.report is not None}
         doubtful = {name: r.warnings for name, r in reports.items() if r.warnings}
         columns = _COLUMNS | (_GROUNDED if self.ground else {})
@@ -112,12 +139,15 @@ class Retarget:
             for k, r in reports.items()
         ]
         title = f"Motion files in {out}: {len(rows)}{', mirrored' * self.mirror}"
-        print_table(title, ["clip", *columns], rows)
-        output.print_warnings(doubtful)
-        self._steer(robot.name, outcomes, split)
-        if split is not None and self.trajectories:
-            self._cut(outcomes, split, out.parent / f"{out.name}-trajectories")
-        output.print_failed((o.segment.name, str(o.error)) for o in failed)
+        figures = {o.segment.name: _figures(o) for o in outcomes}
+        output.do_all(
+            lambda: print_table(title, ["clip", *columns], rows),
+            lambda: output.print_warnings(doubtful),
+            lambda: output.write_json(self.json, figures),
+            lambda: self._steer(robot.name, outcomes, split),
+            lambda: self._cut(outcomes, split, out.parent / f"{out.name}-trajectories"),
+            lambda: output.print_failed((o.segment.name, str(o.error)) for o in failed),
+        )
         return 1 if failed or (self.strict and doubtful) else 0
 
     def _steer(
@@ -147,7 +177,12 @@ class Retarget:
         if self.steer:
             print(f"Steered variants: {written}.")
 
-    def _cut(self, outcomes: "list[Outcome]", split: "Split", folder: Path) -> None:
+    def _cut(
+        self, outcomes: "list[Outcome]", split: "Split | None", folder: Path
+    ) -> None:
+        """Writes the trajectories."""
+        if split is None or not self.trajectories:
+            return
         from loco_drake.datasets.split import TRAIN, VALIDATION
         from loco_drake.retargeting import trajectories
         from loco_drake.retargeting.retarget import stretches_of

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import tyro
 
-from loco_drake.cli.options import Json, UnusedSeed
-from loco_drake.cli.output import print_table, say, write_json
+from loco_drake.cli.options import Json, UnusedSeed, option
+from loco_drake.cli.output import do_all, print_table, say, write_json
 from loco_drake.common.errors import InputError
 
 _TRAININGS = ("tokenizer", "generator", "tracker", "student", "classifier")
@@ -22,7 +22,7 @@ class RunsList:
     """
 
     # Folder to look in, at any depth.
-    folder: Annotated[Path, tyro.conf.Positional] = Path("runs")
+    folder: Annotated[Path, tyro.conf.Positional, option(metavar="DIR")] = Path("runs")
     json: Json = None
     seed: UnusedSeed = 0
 
@@ -38,10 +38,6 @@ class RunsList:
                 "--out names another one."
             )
         runs = find_runs(self.folder)
-        write_json(self.json, {"folder": str(self.folder), "runs": runs})
-        if not runs:
-            say(f"There are no runs in {str(self.folder)!r}.")
-            return 0
         rows = [
             [
                 run["name"],
@@ -54,7 +50,14 @@ class RunsList:
             for run in runs
         ]
         columns = ["run", "training", "steps", "state", "return", "changed, UTC"]
-        print_table(f"Runs in {self.folder}", columns, rows)
+        do_all(
+            lambda: (
+                print_table(f"Runs in {self.folder}", columns, rows)
+                if runs
+                else say(f"There are no runs in {str(self.folder)!r}.")
+            ),
+            lambda: write_json(self.json, {"folder": str(self.folder), "runs": runs}),
+        )
         return 0
 
 

@@ -5,16 +5,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from loco_drake.cli.options import (
+    SCHEDULE,
     Generator,
+    Html,
     Json,
     Policy,
+    Port,
     Tokenizer,
+    Video,
     Weights,
     option,
 )
-from loco_drake.cli.output import write_json
+from loco_drake.cli.output import do_all, say, write_json
 from loco_drake.cli.simulation import (
     Pace,
+    Stop,
     check_duration,
     override,
     print_figures,
@@ -34,55 +39,64 @@ if TYPE_CHECKING:
     from loco_drake.viewing.takes import Scene
 
 
+_GENERATED = ("generated", "gpt")  # the latter formerly
+
+
 @dataclass(kw_only=True)
 class Simulate:
     """Simulate a robot in Drake that tracks generated motion or a Motion file."""
 
     # Robot: go2 or a1.
-    robot: Annotated[str | None, option(metavar="STR", default="go2")] = None
-    # Gait label, such as dog-trot, or a schedule of labels with start times in s, such
-    # as dog-pace,dog-trot@3, or any: the gait then goes with --command. Ignored with a
-    # Motion file.
-    gait: Annotated[str | None, option(metavar="STR", default="dog-trot")] = None
-    # Seconds to simulate; at most the length of a Motion file.
-    duration: Annotated[float | None, option(metavar="FLOAT", default="10.0")] = None
-    # Seed of the generated motion.
-    seed: Annotated[int | None, option(metavar="INT", default="0")] = None
-    # Constant velocity to follow: forward and sideways m/s, yaw rate rad/s. Default:
-    # the motion's own.
-    command: tuple[float, float, float] | None = None
-    # gpt, to generate motion during the simulation, or the path of a Motion file.
-    reference: Annotated[str | None, option(metavar="STR", default="gpt")] = None
+    robot: Annotated[str | None, option(metavar="ROBOT", default="go2")] = None
+    gait: Annotated[
+        str | None,
+        option(
+            f"{SCHEDULE}; or any, which goes with --command. A Motion file has its "
+            "own.",
+            metavar="GAIT",
+            default="dog-trot",
+        ),
+    ] = None
+    # Duration in s: at most that of a Motion file.
+    duration: Annotated[float | None, option(default="10.0")] = None
+    # Seed: of the generated motion.
+    seed: Annotated[int | None, option(default="0")] = None
+    # Constant velocity to follow: forward and sideways m/s, yaw rate rad/s.
+    command: Annotated[
+        tuple[float, float, float] | None,
+        option(metavar="VX VY WZ", default="the motion's own"),
+    ] = None
+    # What is tracked: generated, during the simulation; or a Motion file.
+    reference: Annotated[
+        str | None, option(metavar="NAME|FILE", default="generated")
+    ] = None
     policy: Policy = None
     tokenizer: Tokenizer = None
     generator: Generator = None
     weights: Weights = None
-    # Show the simulation in the browser, at most at real-time speed.
+    # Show the robot in the browser, at most at real-time speed.
     meshcat: bool = True
     # Keep the robot in the middle of the page, live and in the replay; otherwise the
     # camera stays, and the replay shows the whole path.
     follow: bool = True
-    # Meshcat's port. Default: a free one, also if the port is in use.
-    port: int | None = None
-    # Save a replay as one HTML page.
-    html: Path | None = None
-    # Save a video that follows the robot: *.mp4, *.webp or *.gif.
-    video: Path | None = None
+    port: Port = None
+    html: Html = None
+    video: Video = None
     # Contact solver: similar, lagged, sap or cenic.
-    contact: Annotated[str | None, option(metavar="STR", default="similar")] = None
+    contact: Annotated[str | None, option(metavar="NAME", default="similar")] = None
     # Time step of the physics, s.
-    time_step: Annotated[float | None, option(metavar="FLOAT", default="0.01")] = None
+    time_step: Annotated[float | None, option(default="0.01")] = None
     # Coulomb friction coefficient of the ground.
-    friction: Annotated[float | None, option(metavar="FLOAT", default="0.8")] = None
-    # Scenario in YAML, see loco_drake.systems.scenario. Its fields replace the defaults
-    # of the options above; options that are given take precedence.
-    scenario: Annotated[Path | None, option(metavar="PATH")] = None
+    friction: Annotated[float | None, option(default="0.8")] = None
+    # YAML file of a scenario: its fields replace the defaults of the options above;
+    # options that are given take precedence.
+    scenario: Annotated[Path | None, option(metavar="FILE")] = None
     # YAML that overrides fields of the scenario, as in "plant: {accuracy: 1.0e-4}".
     overlay: Annotated[str | None, option(metavar="TEXT")] = None
     json: Json = None
 
     def run(self) -> int:
-        """Simulates, prints and writes; returns the exit status."""
+        """Simulates, prints and writes; returns 1 if Ctrl-C ended it early, else 0."""
         from loco_drake.control.plan import PLAN_DT
         from loco_drake.control.state import POSITION
         from loco_drake.evaluation import tracking
@@ -103,7 +117,14 @@ class Simulate:
             meshcat.StartRecording(frames_per_second=tracking.FRAMES_PER_SECOND)
         # Unless Drake waits.
         waits = self.meshcat and scenario.simulator.target_realtime_rate == 0
-        rollout, wall = recorder.run(duration, Pace(recorder, waits).keep)
+        pace = Pace(recorder, waits)
+        with Stop() as stop:
+
+            def after_step(now: float) -> bool:
+                pace.keep(now)
+                return not stop.asked
+
+            rollout, wall = recorder.run(duration, after_step)
         simulated = (len(rollout.state) - 1) * PLAN_DT
         reference: Any = scenario.reference
         figures = {
@@ -113,23 +134,37 @@ class Simulate:
             "duration_s": duration,
             "simulated_s": simulated,
             "fell": rollout.fell,
+            "interrupted": stop.interrupted,
             **tracking.tracking_metrics(rollout),
             "real_time_factor": simulated / wall,
         }
         if figures["gait"] == ANY:
             figures["chosen"] = str(recorder.gait)
-        if meshcat is not None:
+
+        def save_replay() -> None:
+            if meshcat is None:
+                return
             meshcat.StopRecording()
             meshcat.PublishRecording()
             if not self.follow:
                 tracking.frame(meshcat, rollout.state[POSITION])
             if self.html is not None:
                 save_page(meshcat, self.html)
-        if self.video is not None:
-            make_video(self.video, [_scene(scenario.robot, rollout)])
-        print_figures("Simulation", figures)
-        write_json(self.json, figures)
-        return 0
+
+        def save_video() -> None:
+            if self.video is not None:
+                make_video(self.video, [_scene(scenario.robot, rollout)])
+
+        if stop.interrupted:
+            done = f"{simulated:g} of {duration:g} s"
+            say(f"Stopped by Ctrl-C after {done}; what there is of it is saved.")
+        do_all(
+            lambda: print_figures("Simulation", figures),
+            lambda: write_json(self.json, figures),
+            save_replay,
+            save_video,
+        )
+        return int(stop.interrupted)
 
     def _read(self) -> "tuple[Scenario, float, Motion | None]":
         """Returns what to simulate, for how long, and the motion to follow, if any.
@@ -149,14 +184,14 @@ class Simulate:
         override(scenario, robot=self.robot)
         names = ("contact", "time_step", "friction")
         override(scenario.plant, **{name: getattr(self, name) for name in names})
-        if self.reference == "gpt":
+        if self.reference in _GENERATED:
             if not isinstance(scenario.reference, GeneratedReference):
                 scenario.reference = GeneratedReference()
         elif self.reference is not None:
             if not Path(self.reference).is_file():
                 raise InputError(
-                    f"The reference must be gpt or a Motion file, and there is no file "
-                    f"{self.reference!r}."
+                    "The reference must be generated or a Motion file, and there is no "
+                    f"file {self.reference!r}."
                 )
             scenario.reference = MotionReference(path=Path(self.reference))
         use_weights(
@@ -197,7 +232,7 @@ class Simulate:
         if self.reference is None and (self.gait, self.seed) != (None, None):
             raise InputError(
                 "--gait and --seed are of generated motion, and the scenario's is a "
-                "file: add --reference gpt."
+                "file: add --reference generated."
             )
         motion = load_motion(reference.path)
         if motion.robot != scenario.robot:

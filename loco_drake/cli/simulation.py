@@ -1,9 +1,11 @@
 """What ``simulate`` and ``drive`` share."""
 
+import signal
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from loco_drake.cli.output import print_table
 from loco_drake.common.errors import InputError
@@ -41,20 +43,18 @@ def use_weights(
         InputError: if the folder ``weights`` has none, or several of a kind; or if the
             motion is not generated and ``tokenizer`` or ``generator`` is given.
     """
-    from loco_drake.models.shipped import weights_in
+    from loco_drake.models.shipped import chosen_weights
     from loco_drake.systems.scenario import GeneratedReference, TrainedPolicy
 
-    found = weights_in(weights) if weights is not None else {}
-    policy = policy or found.get("policy")
+    found = chosen_weights(
+        weights, policy=policy, tokenizer=tokenizer, generator=generator
+    )
+    policy = found.pop("policy")
     if policy is not None:
         scenario.policy = TrainedPolicy(weights=policy)
     reference = scenario.reference
     if isinstance(reference, GeneratedReference):
-        override(
-            reference,
-            tokenizer=tokenizer or found.get("tokenizer"),
-            generator=generator or found.get("generator"),
-        )
+        override(reference, **found)
     elif tokenizer is not None or generator is not None:
         raise InputError(
             "--tokenizer and --generator write motion, and the reference is a file."
@@ -140,6 +140,36 @@ class Pace:
             self._start -= ahead
         if self._waits and ahead > 0:
             time.sleep(ahead)
+
+
+class Stop:
+    """Whether a simulation is to end: after Ctrl-C, or a button on the page.
+
+    A second Ctrl-C interrupts as usual.
+
+    Args:
+        pressed: whether the button was pressed.
+    """
+
+    def __init__(self, pressed: Callable[[], bool] = lambda: False) -> None:
+        self._pressed = pressed
+        self.interrupted = False
+
+    @property
+    def asked(self) -> bool:
+        """Whether the simulation is to end."""
+        return self.interrupted or self._pressed()
+
+    def __enter__(self) -> Self:
+        self._before = signal.signal(signal.SIGINT, self._interrupt)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+    def _interrupt(self, number: int, frame: object) -> None:
+        self.interrupted = True
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def print_figures(title: str, figures: dict[str, object]) -> None:

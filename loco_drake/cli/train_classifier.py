@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from loco_drake.cli.options import Motions, OutFolder
 from loco_drake.cli.training import Learned, NetworkTraining, Scores
 from loco_drake.common.errors import InputError
 from loco_drake.motion.gaits import LABELS
@@ -18,14 +19,14 @@ class TrainClassifier(NetworkTraining):
     """
 
     NAME: ClassVar[str] = "classifier"
-    # Folder of Motion files written by `retarget`; motions of the validation set are
+    # Folder of Motion files: written by `retarget`; motions of the validation set are
     # held out for testing.
-    motions: Path = Path("motions/go2")
-    # Folder for classifier.safetensors, the checkpoint and logs.
-    out: Path = Path("runs/classifier")
-    # Total optimizer steps.
+    motions: Motions = Path("motions/go2")
+    # Folder to write to: classifier.safetensors, the checkpoint and logs.
+    out: OutFolder = Path("runs/classifier")
+    # Number of training steps: the optimizer's, including those before --resume.
     steps: int = 300
-    # Peak learning rate.
+    # Learning rate: its peak.
     learning_rate: float = 1e-3
 
     def learn(self) -> Learned:

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
+from loco_drake.cli.options import MotionFolders, OutFolder, option
 from loco_drake.cli.training import Learned, NetworkTraining, Scores
 from loco_drake.common.errors import InputError, check_at_least
 
@@ -17,29 +18,31 @@ if TYPE_CHECKING:
 class TrainGenerator(NetworkTraining):
     """Train the GPT that generates tokens for a gait and a duration.
 
-    With --tell, teaches a generator to be told the velocity of each token; without
+    With --teach, teaches a generator to be told the velocity of each token; without
     being told it remains the same.
 
     Ctrl-C saves a checkpoint and stops; --resume continues.
     """
 
     NAME: ClassVar[str] = "generator"
-    # Folders of the Motion files that the tokenizer was trained on.
-    motions: tuple[Path, ...] = (Path("motions/go2"),)
+    # Folder of Motion files: those that the tokenizer was trained on.
+    motions: MotionFolders = (Path("motions/go2"),)
     # Weights from `train tokenizer`.
-    tokenizer: Path = Path("runs/tokenizer/tokenizer.safetensors")
-    # Folder for generator.safetensors, the checkpoint and logs.
-    out: Path = Path("runs/generator")
-    # Number of codebooks to generate, the coarsest first. Finer codebooks encode detail
-    # that is too irregular to predict.
+    tokenizer: Annotated[Path, option(metavar="FILE")] = Path(
+        "runs/tokenizer/tokenizer.safetensors"
+    )
+    # Folder to write to: generator.safetensors, the checkpoint and logs.
+    out: OutFolder = Path("runs/generator")
+    # Number of codebooks, the coarsest first: to generate. Finer codebooks encode
+    # detail that is too irregular to predict.
     books: int = 8
     # Weights of the generator to teach velocities, instead of training one.
-    tell: Path | None = None
-    # Total optimizer steps.
+    tell: Annotated[Path | None, option(name="teach", metavar="FILE")] = None
+    # Number of training steps: the optimizer's, including those before --resume.
     steps: int = 6000
     # Number of 20 s motions per gait to assemble from the training clips.
     stitched: int = 50
-    # Peak learning rate.
+    # Learning rate: its peak.
     learning_rate: float = 1e-3
     # Weight decay of AdamW.
     weight_decay: float = 0.1

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from loco_drake.cli.options import Json, option
-from loco_drake.cli.output import print_table, say, write_json
+from loco_drake.cli.options import Json, OutFolder, option
+from loco_drake.cli.output import do_all, print_table, say, write_json
 from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.common.progress import progress_bar
 
@@ -20,19 +20,18 @@ class TrainRecipe:
 
     # A shipped recipe (go2, a1) or a YAML file. Required without --resume.
     recipe: Annotated[Path | None, option(metavar="NAME|FILE")] = None
-    # Folder for everything: motions, a run folder for each stage, and the policy.
-    out: Path = Path("runs/recipe")
-    # Continue in --out. A recipe that is given again must agree with what has begun.
+    # Folder to write to: motions, a run folder for each stage, and the policy.
+    out: OutFolder = Path("runs/recipe")
+    # Continue what is in --out: where it was stopped. A recipe that is given again must
+    # agree with what has begun.
     resume: bool = False
-    # Number of simulation processes; must divide the recipe's environments. The results
-    # do not depend on it.
+    # Number of worker processes; it must divide the recipe's environments, and the
+    # results do not depend on it.
     workers: int = 2
     # Try a recipe with this share of its steps and motions.
     scale: float = 1.0
-    # Seed of all trainings.
-    seed: Annotated[int | None, option(metavar="INT", default="that of the recipe")] = (
-        None
-    )
+    # Seed: of all trainings.
+    seed: Annotated[int | None, option(default="that of the recipe")] = None
     json: Json = None
 
     def run(self) -> int:
@@ -66,7 +65,6 @@ class TrainRecipe:
                 workers=self.workers,
                 report=report,
             )
-        write_json(self.json, figures)
         returns, points = figures["curve"]["return"], figures["evaluation"]
         rows = [
             ("steps", f"{figures['steps']}"),
@@ -78,7 +76,10 @@ class TrainRecipe:
             ),
             ("steps to a return of 90", f"{figures['steps_to_90'] or '-'}"),
         ]
-        print_table(str(self.out), ("figure", "value"), rows)
+        do_all(
+            lambda: print_table(str(self.out), ("figure", "value"), rows),
+            lambda: write_json(self.json, figures),
+        )
         if figures["interrupted"]:
             say("Stopped early; the same command with --resume goes on.")
             return 1

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from loco_drake.cli.options import Json, option
+from loco_drake.cli.options import SHIPPED, Json, OutFolder, option
 from loco_drake.cli.training import train_policy
 from loco_drake.common.errors import check_at_least
 from loco_drake.tracking.config import StudentConfig
@@ -19,19 +19,25 @@ class TrainStudent(StudentConfig):
     """
 
     NAME: ClassVar[str] = "student"
-    # Policy to learn from: a shipped one (go2, a1, ...), or the policy.safetensors of
-    # a run; by default the robot's main policy.
-    teacher: Annotated[Path | None, option(metavar="POLICY|FILE")] = None
-    # Folder of Motion files to track, such as `generate` writes. Required
+    teacher: Annotated[
+        Path | None,
+        option(
+            f"Policy to learn from: a shipped one, {SHIPPED}; or the "
+            "policy.safetensors of a run.",
+            metavar="POLICY|FILE",
+            default="the robot's main policy",
+        ),
+    ] = None
+    # Folder of Motion files: those to track, such as `generate` writes. Required
     # without --resume.
-    references: Annotated[Path | None, option(metavar="PATH")] = None
-    # Folder for the checkpoint, policy and TensorBoard logs.
-    out: Path = Path("runs/student")
-    # Randomize friction, masses, motors, latency, pushes and sensor noise in each
-    # episode. Parts without a range of their own use the standard range.
+    references: Annotated[Path | None, option(metavar="DIR", name="motions")] = None
+    # Folder to write to: the checkpoint, policy and TensorBoard logs.
+    out: OutFolder = Path("runs/student")
+    # Randomize the world of each episode: friction, masses, motors, latency, pushes and
+    # sensor noise. Parts without a range of their own use the standard range.
     randomize: bool = False
-    # Continue from the checkpoint in --out with the options of that run. Only --steps
-    # may increase.
+    # Continue what is in --out: from its checkpoint, with the options of that run, of
+    # which only --steps may increase.
     resume: bool = False
     json: Json = None
 

@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from loco_drake.cli.options import MotionFolders, OutFolder
 from loco_drake.cli.training import Learned, NetworkTraining, Scores
 
 
@@ -15,14 +16,14 @@ class TrainTokenizer(NetworkTraining):
     """
 
     NAME: ClassVar[str] = "tokenizer"
-    # Folders of Motion files written by `retarget`, one for each robot; motions of the
+    # Folder of Motion files: written by `retarget`, one for each robot; motions of the
     # validation set are held out for testing.
-    motions: tuple[Path, ...] = (Path("motions/go2"),)
-    # Folder for tokenizer.safetensors, the checkpoint and logs.
-    out: Path = Path("runs/tokenizer")
-    # Total optimizer steps.
+    motions: MotionFolders = (Path("motions/go2"),)
+    # Folder to write to: tokenizer.safetensors, the checkpoint and logs.
+    out: OutFolder = Path("runs/tokenizer")
+    # Number of training steps: the optimizer's, including those before --resume.
     steps: int = 9000
-    # Peak learning rate.
+    # Learning rate: its peak.
     learning_rate: float = 2e-3
 
     def learn(self) -> Learned:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from loco_drake.cli.options import Json, option
+from loco_drake.cli.options import SHIPPED, Json, OutFolder, option
 from loco_drake.cli.training import train_policy
 from loco_drake.common.errors import check_at_least
 from loco_drake.tracking.config import TrainingConfig
@@ -18,19 +18,24 @@ class TrainTracker(TrainingConfig):
     """
 
     NAME: ClassVar[str] = "tracker"
-    # Folder of Motion files to track, such as `generate` writes. Required
+    # Folder of Motion files: those to track, such as `generate` writes. Required
     # without --resume.
-    references: Annotated[Path | None, option(metavar="PATH")] = None
-    # Folder for the checkpoint, policy and TensorBoard logs.
-    out: Path = Path("runs/tracker")
-    # Randomize friction, masses, motors, latency, pushes and sensor noise in each
-    # episode. Parts without a range of their own use the standard range.
+    references: Annotated[Path | None, option(metavar="DIR", name="motions")] = None
+    # Folder to write to: the checkpoint, policy and TensorBoard logs.
+    out: OutFolder = Path("runs/tracker")
+    # Randomize the world of each episode: friction, masses, motors, latency, pushes and
+    # sensor noise. Parts without a range of their own use the standard range.
     randomize: bool = False
-    # Networks to start from: a shipped policy (go2, a1, a1_randomized, ...), or the
-    # policy.safetensors or checkpoint.safetensors of a run; of any robot.
-    start_from: Annotated[Path | None, option(metavar="POLICY|FILE")] = None
-    # Continue from the checkpoint in --out with the options of that run. Only --steps
-    # may increase.
+    start_from: Annotated[
+        Path | None,
+        option(
+            f"Networks to start from: a shipped policy, {SHIPPED}; or the "
+            "policy.safetensors or checkpoint.safetensors of a run; of any robot.",
+            metavar="POLICY|FILE",
+        ),
+    ] = None
+    # Continue what is in --out: from its checkpoint, with the options of that run, of
+    # which only --steps may increase.
     resume: bool = False
     json: Json = None
 

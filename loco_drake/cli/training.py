@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from statistics import fmean
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-import tyro
-
 from loco_drake.cli.options import Json
-from loco_drake.cli.output import print_table, say, write_json, write_results
+from loco_drake.cli.output import do_all, print_table, say, write_json, write_results
+from loco_drake.cli.parsing import parse
 from loco_drake.common.errors import InputError
 from loco_drake.common.progress import progress_bar
 from loco_drake.generation.loop_settings import LoopSettings
@@ -62,8 +61,11 @@ class NetworkTraining(LoopSettings):
             return print_stopped(result.steps, self.steps)
         scores = score()
         training = {"steps": result.steps, "wall_clock_s": result.seconds}
-        write_json(self.json, {**training, **scores.figures})
-        print_table(f"{weights}{scores.title}", scores.columns, scores.rows)
+        title = f"{weights}{scores.title}"
+        do_all(
+            lambda: print_table(title, scores.columns, scores.rows),
+            lambda: write_json(self.json, {**training, **scores.figures}),
+        )
         return 0
 
     def learn(self) -> Learned:
@@ -83,7 +85,7 @@ def train_policy(command: Any, train: TrainPolicy) -> int:
     from loco_drake.tracking.references import load_references
 
     if command.references is None:
-        raise InputError("--references must name a folder of Motion files.")
+        raise InputError("--motions must name a folder of Motion files.")
     robot = get_robot(command.environment.robot)
     plans = load_references(robot, command.references)
     with progress_bar() as bar:
@@ -94,15 +96,18 @@ def train_policy(command: Any, train: TrainPolicy) -> int:
             bar.update(task, completed=steps, note=note)
 
         figures = train(plans, report)
-    write_results(command.json, figures)
     rows = [(label, f"{score:.1f}") for label, score in figures["scores"].items()]
-    print_table("Recent training returns, of 100", ("gait", "return"), rows)
+    title = "Recent training returns, of 100"
+    do_all(
+        lambda: print_table(title, ("gait", "return"), rows),
+        lambda: write_results(command.json, figures),
+    )
     if figures["interrupted"]:
         return print_stopped(figures["steps"], command.steps)
     return 0
 
 
-def parse_resumed(command: Any, prog: str, args: Sequence[str]) -> Any:
+def parse_resumed(command: Any, name: str, args: Sequence[str]) -> Any:
     """Returns a command that resumes; options that are not given are those of the run.
 
     ``command`` was parsed from the same arguments with the defaults of its class.
@@ -121,7 +126,7 @@ def parse_resumed(command: Any, prog: str, args: Sequence[str]) -> Any:
     own = {k: v for k, v in saved.options.items() if k not in _OF_THE_CALL}
     with run_folder.sound(path):
         default = run_folder.with_options(command, own)
-    parsed = tyro.cli(type(command), prog=prog, args=args, default=default)
+    parsed = parse(type(command), name, args, default)
     options = run_folder.options_of(parsed)
     own = run_folder.settings(options, *_OF_THE_CALL, *_FOLDERS)
     run_folder.check_same(saved, own, own, parsed.steps)

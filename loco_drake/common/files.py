@@ -78,7 +78,8 @@ def check_writable(path: Path | None, *, folder: bool = False) -> None:
 
     Raises:
         InputError: if it is a folder and should not be.
-        OSError: if an existing path is not writable, or a parent folder is a file.
+        OSError: if an existing path is not writable, a parent folder is a file, or the
+            disk is full.
     """
     if path is None:
         return
@@ -93,6 +94,8 @@ def check_writable(path: Path | None, *, folder: bool = False) -> None:
             raise NotADirectoryError(20, "Not a folder", str(parent))
         if not os.access(parent, os.W_OK | os.X_OK):
             raise PermissionError(13, "No permission to write into", str(parent))
+        if shutil.disk_usage(parent).free == 0:
+            raise OSError(28, "No space left on the disk", str(parent))
 
 
 def _status(path: Path) -> os.stat_result | None:

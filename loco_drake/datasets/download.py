@@ -105,7 +105,7 @@ def parse_mirror(text: str | None) -> str | Path | None:
         return text and text.rstrip("/")
     if not Path(text).is_dir():
         raise InputError(
-            f"There is no mirror folder {text!r}: --mirror takes a folder, or an "
+            f"There is no mirror folder {text!r}: --from takes a folder, or an "
             "address that starts with http:// or https://."
         )
     return Path(text)

@@ -125,13 +125,14 @@ class Recorder:
         self.fell = False
 
     def run(
-        self, duration: float, after_step: Callable[[float], None] | None = None
+        self, duration: float, after_step: Callable[[float], bool | None] | None = None
     ) -> tuple[Rollout, float]:
         """Simulates until ``duration`` or a fall; call :meth:`start` first.
 
         Args:
             duration: context time to stop at, s.
-            after_step: called after each control period with the context's time, s.
+            after_step: called after each control period with the context's time, s;
+                False ends the simulation there, as if that were ``duration``.
 
         Returns:
             The record, and the wall time spent inside AdvanceTo, s.
@@ -144,8 +145,8 @@ class Recorder:
             wall += time.perf_counter() - start
             if not self.fell:
                 done += 1
-                if after_step is not None:
-                    after_step(done * PLAN_DT)
+                if after_step is not None and after_step(done * PLAN_DT) is False:
+                    steps = done
         return self.rollout(done, steps), wall
 
     def rollout(self, done: int, steps: int) -> Rollout:

@@ -15,17 +15,17 @@ class LoopSettings:
 
     # Folder for the weights, the checkpoint and TensorBoard logs.
     out: Path
-    # Total optimizer steps, including those before --resume.
+    # Number of training steps: the optimizer's, including those before --resume.
     steps: int
-    # Peak learning rate: warms up over the first 2 % of the steps, then decays to 0 as
-    # a half cosine.
+    # Learning rate: its peak. It warms up over the first 2 % of the steps, then decays
+    # to 0 as a half cosine.
     learning_rate: float
     # Weight decay of AdamW.
     weight_decay: float = 0.01
-    # Seed of the initial weights and the batches.
+    # Seed: of the initial weights and the batches.
     seed: int = 0
-    # Continue from the checkpoint in --out with the options of that run. Only --steps
-    # may increase.
+    # Continue what is in --out: from its checkpoint, with the options of that run, of
+    # which only --steps may increase.
     resume: bool = False
     # Optimizer steps between checkpoints.
     checkpoint_every: int = 500

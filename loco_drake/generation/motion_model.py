@@ -285,7 +285,7 @@ class MotionModel:
         if not self.generator.config.told:
             raise InputError(
                 "The generator was not taught velocities; `loco-drake train generator "
-                "--tell` teaches it."
+                "--teach` teaches it."
             )
 
     def check_labels(self, labels: Integers) -> None:

@@ -61,7 +61,7 @@ class EnvironmentConfig:
     """Configuration of an environment, without its plans."""
 
     # Robot: go2 or a1.
-    robot: str = "go2"
+    robot: Annotated[str, tyro.conf.arg(metavar="ROBOT")] = "go2"
     # Contact solver, time step and friction.
     plant: PlantConfig = field(default_factory=PlantConfig)
     # Distance from the plan at which an episode ends.
@@ -72,7 +72,7 @@ class EnvironmentConfig:
     reset_noise: ResetNoise = field(default_factory=ResetNoise)
     # Training penalty per step and per metre of distance from the plan, 1/m. The
     # reward's own term is flat beyond half a metre. Reported returns do not include it.
-    position_penalty: Annotated[float, tyro.conf.arg(aliases=("--homing",))] = 0.0
+    position_penalty: float = 0.0
     # Training cost of a fall in perfect steps, beyond the steps that it loses. Reported
     # returns do not include it.
     fall_cost: float = 0.0
@@ -120,9 +120,9 @@ class EnvironmentConfig:
 class PpoConfig:
     """Configuration of PPO."""
 
-    # Environment steps per update. An interruption loses at most one batch.
+    # Environment steps between updates. An interruption loses at most one batch.
     batch: int = 4096
-    # Environment steps per minibatch.
+    # Samples in a minibatch.
     minibatch: int = 1024
     # Epochs per batch.
     epochs: int = 5
@@ -141,8 +141,10 @@ class PpoConfig:
     critic_rate: float = 1e-3
     # Initial log standard deviation of the actions of new networks.
     log_std: float = -0.7
-    # That of networks to start from. Default: theirs.
-    restart_log_std: float | None = None
+    # That of networks to start from.
+    restart_log_std: Annotated[
+        float | None, tyro.conf.arg(help_behavior_hint="(default: theirs)")
+    ] = None
     # Environment steps at the beginning in which only the critic learns, so that it
     # knows new motion before it judges the actor.
     critic_first: int = 0
@@ -184,13 +186,14 @@ class PpoConfig:
 class TrainingConfig:
     """Configuration of a training."""
 
-    # Total environment steps of 20 ms each, including those before --resume.
+    # Number of training steps: those of the environments, of 20 ms, before --resume and
+    # after it.
     steps: int = 2_000_000
-    # Number of simulation processes.
+    # Number of worker processes.
     workers: int = 2
-    # Environments per process.
+    # Environments in each worker process.
     per_worker: int = 8
-    # Seed of all random numbers.
+    # Seed: of all random numbers.
     seed: int = 0
     # The environment.
     environment: Annotated[EnvironmentConfig, tyro.conf.arg(name="")] = field(
@@ -211,26 +214,27 @@ class TrainingConfig:
 class StudentConfig:
     """Configuration of a student's training."""
 
-    # Environment steps of the training, rounded up to whole batches.
+    # Number of training steps: those of the environments, of 20 ms, rounded up to whole
+    # batches.
     steps: int = 500_000
-    # Worker processes.
+    # Number of worker processes.
     workers: int = 2
-    # Robots that each worker simulates.
+    # Environments in each worker process.
     per_worker: int = 16
-    # Seed of all random numbers.
+    # Seed: of all random numbers.
     seed: int = 0
     # Environment steps between updates. An interruption loses at most one batch.
     batch: int = 4096
-    # Samples per update.
+    # Samples in a minibatch.
     minibatch: int = 512
     # Updates per batch.
     updates: int = 128
-    # Initial learning rate; decays to 0 as a half cosine.
+    # Learning rate: the initial one, which decays to 0 as a half cosine.
     learning_rate: float = 1e-3
     # Samples that are kept to learn from.
     capacity: int = 262_144
-    # Share of the steps over which the teacher's share of the actions falls from 1 to
-    # 0.
+    # Share of the steps over which the teacher's share of the actions falls from all to
+    # none.
     handover: float = 0.05
     # Measurements that the student remembers besides the present one, one each 20 ms.
     history: int = 10

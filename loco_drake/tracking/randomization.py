@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass, replace
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 
 from loco_drake.common.errors import InputError, check_bounds
@@ -23,6 +24,14 @@ if TYPE_CHECKING:
     from loco_drake.systems.scenario import Disturbances
 
 Array = NDArray[np.float64]
+
+# How --help shows parts that are off.
+_OFF = "(default: off)"
+Range = Annotated[
+    tuple[float, float] | None,
+    tyro.conf.arg(metavar="LOW HIGH", help_behavior_hint=_OFF),
+]
+Multiple = Annotated[float | None, tyro.conf.arg(help_behavior_hint=_OFF)]
 
 PUSH_DURATION = 0.1  # s
 
@@ -57,32 +66,32 @@ class RandomizationConfig:
 
     # Coulomb friction coefficient of the ground. A contact uses the harmonic mean with
     # the feet's .8.
-    friction: tuple[float, float] | None = None
+    friction: Range = None
     # Stiffness of the ground in N/m, log-uniform; in series with the feet's 5e4.
-    stiffness: tuple[float, float] | None = None
+    stiffness: Range = None
     # Mass added to the trunk in kg; may be negative.
-    payload: tuple[float, float] | None = None
+    payload: Range = None
     # Shift of the trunk's centre of mass along each of its axes, m.
-    com_shift: tuple[float, float] | None = None
+    com_shift: Range = None
     # Torque of each motor over that of its model.
-    motor_strength: tuple[float, float] | None = None
+    motor_strength: Range = None
     # Delay of the set-points in s, rounded to whole time steps.
-    latency: tuple[float, float] | None = None
+    latency: Range = None
     # Change of the robot's velocity by a push in a random horizontal direction, m/s.
     # The force lasts .1 s.
-    push: tuple[float, float] | None = None
+    push: Range = None
     # Time from the start to the first push and between pushes, s.
     push_interval: tuple[float, float] = (1.0, 3.0)
     # Damping of the motors over that of their model.
-    damping: tuple[float, float] | None = None
+    damping: Range = None
     # Coulomb friction of each joint, N m.
-    joint_friction: tuple[float, float] | None = None
+    joint_friction: Range = None
     # Incline of the ground in degrees, in a random direction.
-    slope: tuple[float, float] | None = None
+    slope: Range = None
     # Height range of smooth bumps of the ground, m.
-    roughness: tuple[float, float] | None = None
+    roughness: Range = None
     # Sensor errors, as a multiple of the standard deviations in docs/tracking.md.
-    noise: float | None = None
+    noise: Multiple = None
 
     def check(
         self, robot: "Robot | None" = None, plant: "PlantConfig | None" = None

@@ -29,7 +29,7 @@ def test_list_counts_clips_frames_seconds_and_names_the_licence(
 
 def test_inspect_draws_a_stretch_and_prints_its_gait(made_data, tmp_path, capsys):
     file = made_data / "dog_mann" / "keypoints" / "made_trot.txt"
-    arguments = [str(file), "--start", "20", "--out", str(tmp_path / "a.png")]
+    arguments = [str(file), "--start", "20", "--save", str(tmp_path / "a.png")]
     arguments += ["--json", str(tmp_path / "a.json")]
     assert tyro.cli(DataInspect, args=arguments).run() == 0
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
@@ -52,7 +52,7 @@ def test_inspect_of_fewer_than_four_frames_is_refused(frames, tmp_path, capsys):
     write_dog_recording(tmp_path / "a.txt")
     lines = (tmp_path / "a.txt").read_text().splitlines(keepends=True)
     (tmp_path / "a.txt").write_text("".join(lines[:frames]))
-    out = ("--out", str(tmp_path / "a.png"))
+    out = ("--save", str(tmp_path / "a.png"))
     assert main(["data", "inspect", str(tmp_path / "a.txt"), *out]) == 2
     assert capsys.readouterr().err.endswith(
         "a.txt cannot be read as a recording of dog: it needs at least 4 frames, not "

@@ -104,7 +104,7 @@ def test_mujoco_gives_the_same_figures(tmp_path, capsys):
     line = "evaluate tracking --simulator mujoco --labels dog-pace --seeds 1"
     line += f" --duration .4 --json {path}"
     results = []
-    for more in ([], ["--mjcf", str(model)]):
+    for more in ([], ["--mujoco-model", str(model)]):
         assert main([*line.split(), *more]) == 0
         results.append(json.loads(path.read_text()))
     first, second = results
@@ -131,10 +131,10 @@ def test_recordings_can_be_followed_in_mujoco(made_data, tmp_path):
     ("options", "message"),
     [
         ("--simulator gazebo", "choices are drake, mujoco"),
-        ("--mjcf a.xml", "add --simulator mujoco"),
+        ("--mujoco-model a.xml", "add --simulator mujoco"),
         ("--simulator mujoco --pushes", "cannot be used with --simulator mujoco"),
         ("--simulator mujoco --contact sap", "cannot be used with --simulator mujoco"),
-        ("--simulator mujoco --mjcf nowhere.xml", "no MJCF file 'nowhere.xml'"),
+        ("--simulator mujoco --mujoco-model nowhere.xml", "no MJCF file 'nowhere.xml'"),
         ("--simulator mujoco --time-step .02", "time_step must be a number from"),
         ("--simulator mujoco --time-step .003", "must divide 0.02 s, as 0.002 does"),
         ("--time-step .04", "time_step must be at most 0.03 s for go2, not 0.04"),

@@ -55,7 +55,7 @@ def names_in(folder):
 def test_fetched_recordings_are_found_by_other_commands(mirror, tmp_path, capsys):
     """Without any option: they lie in the user's cache folder."""
     with serve(mirror) as server:
-        assert main(["data", "fetch", "--mirror", server.url]) == 0
+        assert main(["data", "fetch", "--from", server.url]) == 0
         assert server.asked == FILES
         printed = capsys.readouterr().out
         assert "CC BY-NC 4.0: name the authors, no commercial use." in printed
@@ -63,7 +63,7 @@ def test_fetched_recordings_are_found_by_other_commands(mirror, tmp_path, capsys
         assert "3 files in" in printed
         assert "3 fetched, 0 already there" in printed
 
-        assert main(["data", "fetch", "--mirror", server.url]) == 0
+        assert main(["data", "fetch", "--from", server.url]) == 0
         assert server.asked == FILES
         assert "0 fetched, 3 already there" in capsys.readouterr().out
     data = tmp_path / "cache" / "data"
@@ -79,7 +79,7 @@ def test_a_failed_file_is_status_1_and_a_second_run_completes(mirror, tmp_path, 
     options += ["--json", str(tmp_path / "a.json")]
     with serve(mirror) as server:
         server.cut.add(FILES[1])
-        options += ["--mirror", server.url]
+        options += ["--from", server.url]
         assert main(["data", "fetch", *options]) == 1
         error = capsys.readouterr().err
         assert f"Failed: {FILES[1]} was cut" in error
@@ -111,7 +111,7 @@ def test_own_segments_stay_and_the_folder_of_the_variable_is_used(
     data.mkdir()
     (data / "segments.csv").write_text(own)
     monkeypatch.setenv("LOCO_DRAKE_DATA", str(data))
-    assert main(["data", "fetch", "--mirror", str(mirror)]) == 0
+    assert main(["data", "fetch", "--from", str(mirror)]) == 0
     rows = segments.read_rows(data / "segments.csv")
     assert [row["file"] for row in rows] == [
         *(name.removeprefix("dog_mann/") for name in FILES),
@@ -125,9 +125,7 @@ def test_a_damaged_table_in_the_way_is_refused_before_the_download(
     data = tmp_path / "data"
     data.mkdir()
     (data / "segments.csv").write_text("a,b\n1,2\n")
-    assert (
-        main(["data", "fetch", "--mirror", str(mirror), "--data-dir", str(data)]) == 2
-    )
+    assert main(["data", "fetch", "--from", str(mirror), "--data-dir", str(data)]) == 2
     assert "line 1 lacks dataset" in capsys.readouterr().err
     assert names_in(data) == ["segments.csv"]
 
@@ -137,7 +135,7 @@ def test_many_failures_are_counted_not_all_listed(mirror, tmp_path, capsys):
     header, row, *_ = download.MANIFEST.read_text().splitlines()
     rows = [row.replace("made_pace", f"made_{i}", 1) for i in range(14)]
     download.MANIFEST.write_text("\n".join([header, *rows]) + "\n")
-    assert main(["data", "fetch", "--mirror", str(tmp_path / "empty")]) == 1
+    assert main(["data", "fetch", "--from", str(tmp_path / "empty")]) == 1
     printed = capsys.readouterr()
     assert printed.err.count("cannot be read from the mirror: No such file") == 10
     assert "Failed: 4 more files" in printed.err
@@ -153,7 +151,7 @@ from loco_drake.cli.main import main
 from loco_drake.datasets import download
 
 download.MANIFEST = Path(sys.argv[1])
-raise SystemExit(main(["data", "fetch", "--mirror", sys.argv[2]]))
+raise SystemExit(main(["data", "fetch", "--from", sys.argv[2]]))
 """
 
 
@@ -184,7 +182,7 @@ def test_real_recordings_are_all_there_and_nothing_is_fetched(real_data, tmp_pat
     sources = [s for s, d in DATASETS.items() if (real_data / d.folder).is_dir()]
     (tmp_path / "empty").mkdir()
     path = tmp_path / "a.json"
-    options = ["--data-dir", str(real_data), "--mirror", str(tmp_path / "empty")]
+    options = ["--data-dir", str(real_data), "--from", str(tmp_path / "empty")]
     options += ["--source", *sources]
     assert main(["data", "fetch", *options, "--json", str(path)]) == 0
     for source in json.loads(path.read_text()).values():

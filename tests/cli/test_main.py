@@ -94,7 +94,7 @@ WRONG = {
     "simulate --time-step 0": "time_step must be a number from 1e-05 to 0.05, not",
     "simulate --friction nan": "friction must be a number from 1e-06 to 1000, not",
     "simulate --port 80 --meshcat": "The port must be from 1024 to 65535, not 80",
-    "simulate --reference FILES/none.npz": "must be gpt or a Motion file",
+    "simulate --reference FILES/none.npz": "must be generated or a Motion file",
     "simulate --reference FILES/text.npz": "is not a Motion file",
     "simulate --reference FILES/nan.npz": "base_position of this motion hold NaN",
     "simulate --reference FILES/joints.npz": r"must have shape \(26, 12\), not",
@@ -107,11 +107,11 @@ WRONG = {
     "simulate --policy FILES/cut_tokenizer.safetensors": "is damaged",
     "simulate --policy FILES/policy_of_a1.safetensors": "another robot: a1, not go2",
     "export --robot spot": "Unknown robot 'spot'; the choices are go2, a1",
-    "export --out policy.txt": "--out must end in .onnx, not 'policy.txt'",
+    "export --onnx policy.txt": "--onnx must end in .onnx, not 'policy.txt'",
     "export --mjcf go2.urdf": "--mjcf must end in .xml, not 'go2.urdf'",
-    "export --mjcf go2.xml --policy robust": "are of a policy: add --out",
+    "export --mjcf go2.xml --policy robust": "are of a policy: add --onnx",
     "export --plans plans.csv": "--plans must end in .npz, not 'plans.csv'",
-    "export --plans a.npz --json b.json": "are of a policy: add --out",
+    "export --plans a.npz --json b.json": "are of a policy: add --onnx",
     "export --gait dog-trot": "are of a plan: add --plans",
     "export --plans a.npz --gait fly": f"Unknown gait 'fly'; the choices are {GAITS}",
     "export --plans a.npz --gait dog-pace,dog-trot@12": "before the end, at 10 s",
@@ -149,7 +149,7 @@ WRONG = {
     "evaluate tokenizer --data-dir FILES/motions --books 99": "from 1 to",
     "evaluate generation --robot spot": "'spot'; the choices are go2, a1, all",
     "evaluate generation --labels fly": f"Unknown gait 'fly'; the choices are {GAITS}",
-    "evaluate generation --count 0": "--count must be 1 or more, not 0",
+    "evaluate generation --trajectories 0": "--trajectories must be 1 or more, not 0",
     "evaluate generation --minutes -1": "--minutes must be 0 or more, not -1",
     "evaluate generation --data-dir FILES/none": "There is no data folder",
     "evaluate generation --data-dir FILES/empty --motions FILES/empty": "Motion files",
@@ -166,7 +166,7 @@ WRONG = {
     "data list --data-dir FILES/none": "There is no data folder .*LOCO_DRAKE_DATA",
     "data fetch --source cat": "Unknown source 'cat'; the choices are dog",
     "data fetch --source dog cat": "Unknown source 'cat'; the choices are dog",
-    "data fetch --mirror FILES/none": "no mirror folder .* a folder, or an address",
+    "data fetch --from FILES/none": "no mirror folder .* a folder, or an address",
     "data fetch --data-dir FILES/text.npz": "is a file, not a folder",
     "data inspect FILES/none.txt": "There is no file",
     "data inspect FILES/none.txt --source cat": "'cat'; the choices are dog",
@@ -177,25 +177,25 @@ WRONG = {
     "train generator --stitched 0": "--stitched must be 1 or more, not 0",
     "train classifier --motions FILES/empty": "Motion files",
     "train generator --motions FILES/motions --tokenizer FILES/no": "no tokenizer",
-    "train tracker --references FILES/empty": r"no Motion files \(\*.npz\)",
+    "train tracker --motions FILES/empty": r"no Motion files \(\*.npz\)",
     "report --results FILES/none": "There is no folder of results .*generation.json",
     "report --results FILES/empty": "no results in .*one or more of retargeting.json",
     "report --results FILES/results": "tokenizer.json is damaged: it is not JSON",
-    "report --replays dog-fly": f"Unknown gait 'dog-fly'; the choices are {GAITS}",
-    "report --replays none dog-trot": "none, or gait labels, not both",
-    "report --replay-seconds 0": DURATION,
+    "report --labels dog-fly": f"Unknown gait 'dog-fly'; the choices are {GAITS}",
+    "report --labels none dog-trot": "none, or gait labels, not both",
+    "report --duration 0": DURATION,
     "report --seed -1": "--seed must be 0 or more, not -1",
-    "train tracker --references FILES/empty --robot spot": "the choices are go2, a1",
-    "train tracker --references FILES/empty --minibatch 0": "--minibatch must be",
-    "train tracker --references FILES/empty --batch 9": "--batch must be at least 32",
-    "train tracker --references FILES/empty --steps 0": "--steps must be 1 or more",
-    "train tracker --references FILES/empty --termination.position 0": (
+    "train tracker --motions FILES/empty --robot spot": "the choices are go2, a1",
+    "train tracker --motions FILES/empty --minibatch 0": "--minibatch must be",
+    "train tracker --motions FILES/empty --batch 9": "--batch must be at least 32",
+    "train tracker --motions FILES/empty --steps 0": "--steps must be 1 or more",
+    "train tracker --motions FILES/empty --termination.position 0": (
         "position must be above 0, not 0"
     ),
-    "train tracker --references FILES/empty --homing=-1": (
+    "train tracker --motions FILES/empty --homing=-1": (
         "--position-penalty must be 0 or more, not -1"
     ),
-    "train tracker --references FILES/empty --fall-cost=-2": (
+    "train tracker --motions FILES/empty --fall-cost=-2": (
         "--fall-cost must be 0 or more, not -2"
     ),
 }
@@ -276,19 +276,22 @@ def test_help_of_simulate_has_units_and_defaults(capsys):
         main(["simulate", "--help"])
     # Each option with what is said of it, on one line.
     printed = re.sub(r"[\s│]+", " ", capsys.readouterr().out)
-    assert re.search(r"--robot STR [^(]*go2 or a1[^(]* \(default: go2\)", printed)
-    assert re.search(r"--gait STR [^(]* \(default: dog-trot\)", printed)
-    assert re.search(r"--duration FLOAT Seconds [^(]* \(default: 10.0\)", printed)
+    assert re.search(r"--robot ROBOT [^(]*go2 or a1[^(]* \(default: go2\)", printed)
+    assert re.search(r"--gait GAIT [^(]* \(default: dog-trot\)", printed)
+    assert re.search(r"--duration FLOAT Duration in s[^(]* \(default: 10.0\)", printed)
     assert re.search(r"--time-step FLOAT [^(]*, s. \(default: 0.01\)", printed)
 
 
-def test_a_file_that_cannot_be_written_is_status_1(made_data, tmp_path, capsys):
+def test_a_file_that_cannot_be_written_is_status_2(made_data, tmp_path, capsys):
     (tmp_path / "file").write_text("")
     target = str(tmp_path / "file" / "a.json")
-    assert main(["data", "list", "--data-dir", str(made_data), "--json", target]) == 1
+    assert main(["data", "list", "--data-dir", str(made_data), "--json", target]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""  # found out before the work
-    assert printed.err == f"loco-drake: Not a folder: {tmp_path / 'file'}\n"
+    assert printed.err == (
+        f"loco-drake: {target!r} cannot be written: Not a folder: "
+        f"{tmp_path / 'file'}.\n"
+    )
 
 
 @pytest.mark.parametrize(
@@ -296,9 +299,9 @@ def test_a_file_that_cannot_be_written_is_status_1(made_data, tmp_path, capsys):
     [
         "data list --json FOLDER",
         "simulate --html FOLDER",
-        "export --out FOLDER",
+        "export --onnx FOLDER",
         "export --plans FOLDER",
-        "report --out FOLDER",
+        "report --html FOLDER",
     ],
 )
 def test_a_folder_where_a_file_is_to_be_written_is_status_2(line, tmp_path, capsys):
@@ -310,12 +313,12 @@ def test_a_folder_where_a_file_is_to_be_written_is_status_2(line, tmp_path, caps
 
 
 @pytest.mark.parametrize("option", ["--out", "--json"])
-def test_a_file_where_a_folder_is_needed_is_status_1_before_the_work(
+def test_a_file_where_a_folder_is_needed_is_status_2_before_the_work(
     option, tmp_path, capsys
 ):
     (tmp_path / "file").write_text("kept")
     arguments = f"generate {option} {tmp_path / 'file' / 'a'}"
-    assert main(arguments.split()) == 1
+    assert main(arguments.split()) == 2
     assert "Not a folder" in capsys.readouterr().err
     assert (tmp_path / "file").read_text() == "kept"
 

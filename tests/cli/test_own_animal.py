@@ -44,7 +44,7 @@ def test_proposed_file_makes_go2_motion_with_the_numbers_it_was_made_of(
     """A cat in m, z up, and a horse in inches, y up: speed, period, feet and bounds."""
     bvh, file = tmp_path / "a.bvh", tmp_path / "animal.yaml"
     write_bvh(bvh, animal, heading=heading)
-    assert main(["data", "inspect", str(bvh), "--skeleton", "--out", str(file)]) == 0
+    assert main(["data", "inspect", str(bvh), "--skeleton", "--save", str(file)]) == 0
     if animal is HORSE:
         assert "1.5 m high in in" in file.read_text()
         file.write_text(file.read_text().replace("units: cm", "units: in"))
@@ -89,7 +89,7 @@ def test_data_folder_and_worker_processes_know_the_source(tmp_path):
     table = "\n".join(["dataset,file,gait,start_frame,end_frame,fps", *rows])
     (tmp_path / "segments.csv").write_text(table + "\n")
     file = tmp_path / "cat.yaml"
-    command = f"data inspect {tmp_path}/cat/a.bvh --skeleton --out {file}"
+    command = f"data inspect {tmp_path}/cat/a.bvh --skeleton --save {file}"
     assert main(shlex.split(command)) == 0
     command = f"retarget --source {file} --gait walk --data-dir {tmp_path} --workers 2"
     assert main(shlex.split(f"{command} --trajectories 0 --out {tmp_path}/out")) == 0
@@ -115,7 +115,7 @@ def test_inspect_says_what_a_file_holds_and_proposes_yaml(tmp_path, capsys):
 def test_inspect_proposes_cuts_in_table_picture_and_json(tmp_path, capsys):
     write_bvh(tmp_path / "a.bvh", EXAMPLE, 7.0, schedule=SCHEDULE)
     options = ["--source", str(ROOT / "examples" / "cat.yaml")]
-    outputs = ["--out", str(tmp_path / "a.png"), "--json", str(tmp_path / "a.json")]
+    outputs = ["--save", str(tmp_path / "a.png"), "--json", str(tmp_path / "a.json")]
     assert main(["data", "inspect", str(tmp_path / "a.bvh"), *options, *outputs]) == 0
     printed = capsys.readouterr().out
     assert "It holds standing, walk, trot, and begins with" in printed
@@ -130,7 +130,7 @@ def test_inspect_proposes_cuts_in_table_picture_and_json(tmp_path, capsys):
     [
         ("--source horse", "takes no --source, --start and --end"),
         ("--start 5", "takes no --source, --start and --end"),
-        ("--out a.txt", "A skeleton's file ends in .yaml, unlike a.txt"),
+        ("--save a.txt", "A skeleton's file ends in .yaml, unlike a.txt"),
         ("--fps 1", "1 frames/s is not plausible"),
     ],
 )
@@ -156,11 +156,11 @@ def test_the_documentation_shows_the_example_file_and_the_cuts(tmp_path, capsys)
     example = ROOT / "examples" / "cat.yaml"
     assert block == example.read_text()
     bvh, file = str(ROOT / "examples" / "cat.bvh"), tmp_path / "cat.yaml"
-    assert main(["data", "inspect", bvh, "--skeleton", "--out", str(file)]) == 0
+    assert main(["data", "inspect", bvh, "--skeleton", "--save", str(file)]) == 0
     assert file.read_text() == block.partition("\n")[2]  # behind a comment
     printed = {" ".join(line.split()) for line in capsys.readouterr().out.splitlines()}
     picture = str(tmp_path / "a.png")
-    assert main(["data", "inspect", bvh, "--source", str(file), "--out", picture]) == 0
+    assert main(["data", "inspect", bvh, "--source", str(file), "--save", picture]) == 0
     printed |= {" ".join(line.split()) for line in capsys.readouterr().out.splitlines()}
     blocks = re.findall(r"^```(\w*)\n(.*?)^```$", page, re.M | re.S)
     shown = "".join(text for language, text in blocks if not language)

@@ -96,7 +96,7 @@ def test_the_source_is_shown_where_it_is_found(files, made_data, tmp_path, capsy
     assert main([*line, *data, "--out", str(out)]) == 0
     (motion,) = out.glob("*.npz")
     page, figures = tmp_path / "a.html", tmp_path / "a.json"
-    line = ["play", str(motion), str(files["trot"]), "--source", *data]
+    line = ["play", str(motion), str(files["trot"]), "--keypoints", *data]
     assert main([*line, "--html", str(page), "--json", str(figures)]) == 0
     first, second = json.loads(figures.read_text())["files"]
     assert first["source"] == "made_trot.txt"
@@ -147,7 +147,7 @@ def test_it_plays_until_the_page_stops_it(files, monkeypatch, capsys):
         ("{solo8}", "is a motion of solo8, not of go2, a1: name the YAML file"),
         ("{solo8} --robot spot", "Unknown robot 'spot'"),
         ("{trot} --video a.avi", r"named *.mp4, *.webp, *.gif, not 'a.avi'"),
-        ("{trot} --source --data-dir none", "There is no data folder 'none'"),
+        ("{trot} --keypoints --data-dir none", "There is no data folder 'none'"),
         ("{trot} --port 1", "The port must be from 1024 to 65535"),
         ("--side-by-side" + 13 * " {trot}", "At most 12 files"),
     ],

@@ -22,7 +22,7 @@ from tests.report_results import (
 def make(folder, *options):
     """Runs the command; returns the page and the figures."""
     page, figures = folder / "page.html", folder / "figures.json"
-    line = ["report", "--out", str(page), "--json", str(figures), *map(str, options)]
+    line = ["report", "--html", str(page), "--json", str(figures), *map(str, options)]
     assert main(line) == 0
     return page.read_text(encoding="utf-8"), json.loads(figures.read_text())
 
@@ -61,7 +61,7 @@ def made(tmp_path_factory):
         steering_go2=steering(),
         robustness_go2=robustness(),
     )
-    return make(folder, "--results", results, "--replays", "none")
+    return make(folder, "--results", results, "--labels", "none")
 
 
 def test_goals_met_and_missed_are_marked_beside_what_is_known(made):
@@ -186,7 +186,7 @@ def test_every_link_in_the_page_leads_somewhere(made):
 def shipped(tmp_path_factory):
     """Page and figures of the results that come with the package, with one replay."""
     folder = tmp_path_factory.mktemp("shipped")
-    return make(folder, "--replays", "dog-trot", "--replay-seconds", 1)
+    return make(folder, "--labels", "dog-trot", "--duration", 1)
 
 
 @pytest.mark.slow
@@ -229,7 +229,7 @@ def test_damaged_results_leave_an_older_page_alone(tmp_path, capsys):
     (tmp_path / "results" / "tracking-go2-generated.json").write_text('{"robot"')
     page = tmp_path / "page.html"
     page.write_text("older")
-    line = ["report", "--results", str(results), "--out", str(page)]
+    line = ["report", "--results", str(results), "--html", str(page)]
     assert main(line) == 2
     printed = capsys.readouterr()
     assert printed.err.count("\n") == 1

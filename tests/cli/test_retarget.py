@@ -72,7 +72,7 @@ def test_steered_variants_are_written_but_not_of_validation(
     out = tmp_path / "out"
     arguments = ("--data-dir", made_data, "--out", out, "--trajectories", "0")
     assert (
-        command(*arguments, "--gait", "pace", "--gait", "trot", "--steer", "2").run()
+        command(*arguments, "--gait", "pace", "--gait", "trot", "--steered", "2").run()
         == 0
     )
     plain = [path for path in out.glob("*.npz") if "steered" not in path.stem]
@@ -88,7 +88,7 @@ def test_steered_variants_are_written_but_not_of_validation(
     assert count > 0
     assert f"Steered variants: {count}." in capsys.readouterr().out
     with pytest.raises(InputError, match="the choices are go2, a1"):
-        command(*arguments, "--robot", SOLO8, "--steer", "1").run()
+        command(*arguments, "--robot", SOLO8, "--steered", "1").run()
 
 
 def test_one_file_with_a_stretch_for_the_a1(made_data, tmp_path):
@@ -169,7 +169,7 @@ def test_robots_that_can_only_be_retargeted_to_are_refused_elsewhere(
         ("simulate", "--robot", "go2", "--reference", motion, "--no-meshcat"),
         ("generate", "--robot", SOLO8),
         ("train", "tokenizer", "--motions", tmp_path, "--out", tmp_path / "t"),
-        ("train", "tracker", "--robot", SOLO8, "--references", tmp_path),
+        ("train", "tracker", "--robot", SOLO8, "--motions", tmp_path),
         ("evaluate", "tracking", "--robot", SOLO8),
     ]
     capsys.readouterr()
@@ -347,7 +347,7 @@ def test_grounded_motion_goes_to_a_folder_of_its_own(
     """With its price in the JSON file and the table; other robots have no masses."""
     monkeypatch.chdir(tmp_path)
     options = ("--data-dir", made_data, "--gait", "trot", "--trajectories", 0)
-    assert command(*options, "--ground", "--json", "a.json", "--steer", 1).run() == 0
+    assert command(*options, "--ground", "--json", "a.json", "--steered", 1).run() == 0
     folder = tmp_path / "motions" / "go2-grounded"
     name = "dog-trot-made_trot-0-240"
     figures = json.loads((tmp_path / "a.json").read_text())[name]

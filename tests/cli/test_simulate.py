@@ -211,7 +211,7 @@ def test_options_of_generated_motion_do_not_go_with_a_scenarios_file(tmp_path, c
     overlay = f"reference: !MotionReference {{path: {tmp_path / 'a.npz'}}}"
     line = ["simulate", "--no-meshcat", "--overlay", overlay, "--gait", "dog-trot"]
     assert main(line) == 2
-    assert "add --reference gpt" in capsys.readouterr().err
+    assert "add --reference generated" in capsys.readouterr().err
 
 
 def test_a_constant_command_is_followed(weights, tmp_path):

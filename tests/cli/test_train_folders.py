@@ -40,7 +40,7 @@ def made(tmp_path_factory):
         "tokenizer": f"--motions {folder}/m --steps 1",
         "generator": f"--motions {folder}/m {tokenizer} --books 2 --stitched 1 "
         "--steps 1",
-        "tracker": f"--references {folder}/m --workers 1 --per-worker 2 --batch 64 "
+        "tracker": f"--motions {folder}/m --workers 1 --per-worker 2 --batch 64 "
         "--steps 64",
         "classifier": f"--motions {folder}/m --steps 1",
     }

@@ -10,7 +10,7 @@ from loco_drake.tracking.randomization import STANDARD
 
 
 def train(references, *options):
-    return main(["train", "student", "--references", str(references), *options])
+    return main(["train", "student", "--motions", str(references), *options])
 
 
 @pytest.mark.slow

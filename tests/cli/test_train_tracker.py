@@ -12,7 +12,7 @@ from loco_drake.tracking.randomization import STANDARD
 
 
 def train(references, *options):
-    return main(["train", "tracker", "--references", str(references), *options])
+    return main(["train", "tracker", "--motions", str(references), *options])
 
 
 @pytest.mark.slow

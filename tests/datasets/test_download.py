@@ -183,6 +183,6 @@ def test_longer_file_than_the_manifest_says_is_refused_on_the_way(
 
 @pytest.mark.parametrize("text", ["nowhere", "ftp://host/data"])
 def test_a_mirror_is_a_folder_or_an_address(text):
-    with pytest.raises(InputError, match=f"'{text}': --mirror takes a folder, or"):
+    with pytest.raises(InputError, match=f"'{text}': --from takes a folder, or"):
         parse_mirror(text)
     assert parse_mirror(None) is None

@@ -102,7 +102,7 @@ def test_an_exported_policy_trots_in_mujoco_without_a_fall(tmp_path, monkeypatch
     from loco_drake.models.mujoco_plant import MujocoConfig
 
     monkeypatch.chdir(tmp_path)
-    files = "--out policy.onnx --plans plans.npz --mjcf go2.xml"
+    files = "--onnx policy.onnx --plans plans.npz --mjcf go2.xml"
     line = f"export {files} --gait dog-trot --duration 3 --seed 5"
     assert main(line.split()) == 0
     printed = run(tmp_path, "deploy_onnx.py")

@@ -54,7 +54,7 @@ RECORDINGS = {
 }
 
 
-_FETCH = "data fetch --mirror mirror --data-dir out/data --json out/figures.json"
+_FETCH = "data fetch --from mirror --data-dir out/data --json out/figures.json"
 _FETCH_PATCHES = {
     "loco_drake.datasets.download.MANIFEST": "manifest.csv",
     "loco_drake.datasets.segments.SHIPPED": "shipped.csv",
@@ -156,7 +156,7 @@ def _kinds() -> Iterator[Kind]:
         options = f"--source {source} --json out/figures.json"
         for name, command, share in (
             ("retargeted", f"retarget --gait {gait} --out out", 2.0),
-            ("inspected", "data inspect --out out/clip.png", 1.0),
+            ("inspected", "data inspect --save out/clip.png", 1.0),
         ):
             yield Kind(
                 f"{form}, {name}",
@@ -259,7 +259,7 @@ def _kinds() -> Iterator[Kind]:
         yield Kind(
             f"results, {name}",
             f"results/{name}.json",
-            "report --results results --replays none --out out/report.html "
+            "report --results results --labels none --html out/report.html "
             "--json out/figures.json",
             makers.result(name),
             formats.json_document,

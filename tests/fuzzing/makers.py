@@ -8,7 +8,7 @@ from pathlib import Path
 
 TOKENIZER = "train tokenizer --motions motions --steps 2 --out out/run"
 TRACKER = (
-    "train tracker --references motions --steps 64 --batch 32 --workers 1 "
+    "train tracker --motions motions --steps 64 --batch 32 --workers 1 "
     "--per-worker 2 --out out/run --json out/figures.json"
 )
 DRIVE = "drive --no-meshcat --duration 0.12"

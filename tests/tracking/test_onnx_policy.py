@@ -36,7 +36,7 @@ def exported(tmp_path_factory):
     weights, out = folder / "policy.safetensors", folder / "policy.onnx"
     save_actor(actor, weights)
     figures = folder / "metadata.json"
-    line = ["export", "--policy", str(weights), "--out", str(out)]
+    line = ["export", "--policy", str(weights), "--onnx", str(out)]
     assert main([*line, "--json", str(figures)]) == 0
     assert sorted(path.name for path in folder.iterdir()) == [
         "metadata.json",
@@ -118,7 +118,7 @@ def test_without_the_extra_one_sentence_says_what_to_install(
 ):
     monkeypatch.setitem(sys.modules, "onnxscript", None)
     out = tmp_path / "policy.onnx"
-    assert main(["export", "--out", str(out)]) == 2
+    assert main(["export", "--onnx", str(out)]) == 2
     assert capsys.readouterr().err == (
         "loco-drake: To export to ONNX, install the packages onnx and onnxscript, the "
         "extra 'onnx' of loco_drake.\n"

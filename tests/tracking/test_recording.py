@@ -83,7 +83,7 @@ def test_motion_of_several_gaits_is_refused(robot, actor, trot):
 def test_command_writes_what_went_well(robot, trot, tmp_path, capsys):
     """Grounded, with what it is worth in its provenance; the rest is left out."""
     save_motion(trot, tmp_path / "good.npz")
-    options = ("--references", tmp_path, "--out", tmp_path / "out", "--attempts", 1)
+    options = ("--motions", tmp_path, "--out", tmp_path / "out", "--attempts", 1)
 
     def command(*more):
         arguments = [str(each) for each in (*options, *more)]
@@ -102,4 +102,4 @@ def test_command_writes_what_went_well(robot, trot, tmp_path, capsys):
     assert command("--no-ground", "--out", tmp_path / "plain") == 0
     assert not load_motion(tmp_path / "plain" / "good.npz").grounded
     with pytest.raises(InputError, match="no Motion files"):
-        tyro.cli(Record, args=["--references", str(tmp_path / "none")]).run()
+        tyro.cli(Record, args=["--motions", str(tmp_path / "none")]).run()
