@@ -23,7 +23,6 @@ from loco_drake.cli.options import (
 from loco_drake.cli.output import do_all, write_json
 from loco_drake.cli.simulation import (
     Pace,
-    Stop,
     check_duration,
     override,
     print_figures,
@@ -100,6 +99,7 @@ class Drive:
     def run(self) -> int:
         """Drives, prints and writes; returns the exit status."""
         from loco_drake.cli.drive_view import DriveView
+        from loco_drake.common.run_folder import stop_requests
         from loco_drake.control.drive_file import save_drive, states_sha256
         from loco_drake.control.plan import PLAN_DT
         from loco_drake.evaluation.drive_scores import drive_scores
@@ -136,18 +136,14 @@ class Drive:
         # Unless Drake waits.
         waits = self.meshcat and scenario.simulator.target_realtime_rate == 0
         pace = Pace(recorder, waits)
-
-        def pressed() -> bool:
-            return driver is not None and driver.stopped
-
-        with Stop(pressed) as stop, DriveView(recorder, meshcat, driver) as view:
+        with stop_requests() as stop, DriveView(recorder, meshcat, driver) as view:
             if steps is None:
                 print("Drive on that page; its Stop button or Ctrl-C ends.", flush=True)
 
             def after_step(now: float, orders: Any) -> bool:
                 view.update(now, orders)
                 pace.keep(now)
-                return not stop.asked
+                return not (stop.is_set() or (driver and driver.stopped))
 
             driven = drive(recorder, steps, after_step)
             elapsed = pace.elapsed

@@ -77,8 +77,8 @@ def main(arguments: list[str] | None = None) -> int:
         )
     except OSError as error:
         # Such as a full disk or a read-only folder.
-        reason = f"{error.strerror}: {error.filename}" if error.filename else error
-        return _failed(one_line(str(reason)))
+        where = f": {error.filename}" if error.filename else ""
+        return _failed(one_line(f"{error.strerror or error}{where}"))
     except KeyboardInterrupt:
         return _failed("interrupted")
 

@@ -19,7 +19,6 @@ from loco_drake.cli.options import (
 from loco_drake.cli.output import do_all, say, write_json
 from loco_drake.cli.simulation import (
     Pace,
-    Stop,
     check_duration,
     override,
     print_figures,
@@ -96,7 +95,8 @@ class Simulate:
     json: Json = None
 
     def run(self) -> int:
-        """Simulates, prints and writes; returns 1 if Ctrl-C ended it early, else 0."""
+        """Simulates, prints and writes; returns 1 if it was stopped early, else 0."""
+        from loco_drake.common.run_folder import stop_requests
         from loco_drake.control.plan import PLAN_DT
         from loco_drake.control.state import POSITION
         from loco_drake.evaluation import tracking
@@ -118,11 +118,11 @@ class Simulate:
         # Unless Drake waits.
         waits = self.meshcat and scenario.simulator.target_realtime_rate == 0
         pace = Pace(recorder, waits)
-        with Stop() as stop:
+        with stop_requests() as stop:
 
             def after_step(now: float) -> bool:
                 pace.keep(now)
-                return not stop.asked
+                return not stop.is_set()
 
             rollout, wall = recorder.run(duration, after_step)
         simulated = (len(rollout.state) - 1) * PLAN_DT
@@ -134,7 +134,7 @@ class Simulate:
             "duration_s": duration,
             "simulated_s": simulated,
             "fell": rollout.fell,
-            "interrupted": stop.interrupted,
+            "interrupted": stop.is_set(),
             **tracking.tracking_metrics(rollout),
             "real_time_factor": simulated / wall,
         }
@@ -155,16 +155,17 @@ class Simulate:
             if self.video is not None:
                 make_video(self.video, [_scene(scenario.robot, rollout)])
 
-        if stop.interrupted:
-            done = f"{simulated:g} of {duration:g} s"
-            say(f"Stopped by Ctrl-C after {done}; what there is of it is saved.")
+        done = (
+            f"Stopped after {simulated:g} of {duration:g} s; the figures are of these."
+        )
         do_all(
             lambda: print_figures("Simulation", figures),
+            lambda: say(done) if stop.is_set() else None,
             lambda: write_json(self.json, figures),
             save_replay,
             save_video,
         )
-        return int(stop.interrupted)
+        return int(stop.is_set())
 
     def _read(self) -> "tuple[Scenario, float, Motion | None]":
         """Returns what to simulate, for how long, and the motion to follow, if any.

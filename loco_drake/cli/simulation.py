@@ -1,11 +1,9 @@
 """What ``simulate`` and ``drive`` share."""
 
-import signal
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from loco_drake.cli.output import print_table
 from loco_drake.common.errors import InputError
@@ -140,36 +138,6 @@ class Pace:
             self._start -= ahead
         if self._waits and ahead > 0:
             time.sleep(ahead)
-
-
-class Stop:
-    """Whether a simulation is to end: after Ctrl-C, or a button on the page.
-
-    A second Ctrl-C interrupts as usual.
-
-    Args:
-        pressed: whether the button was pressed.
-    """
-
-    def __init__(self, pressed: Callable[[], bool] = lambda: False) -> None:
-        self._pressed = pressed
-        self.interrupted = False
-
-    @property
-    def asked(self) -> bool:
-        """Whether the simulation is to end."""
-        return self.interrupted or self._pressed()
-
-    def __enter__(self) -> Self:
-        self._before = signal.signal(signal.SIGINT, self._interrupt)
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        signal.signal(signal.SIGINT, self._before)
-
-    def _interrupt(self, number: int, frame: object) -> None:
-        self.interrupted = True
-        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def print_figures(title: str, figures: dict[str, object]) -> None:
