@@ -127,7 +127,7 @@ class DataInspect:
         from loco_drake.retargeting.inspection import clip_figure, summarize
 
         source = load_source(self.source)
-        if self.out is not None and self.out.suffix not in _PLOTS:
+        if self.out is not None and self.out.suffix.lower() not in ("", *_PLOTS):
             raise InputError(
                 f"A plot ends in {', '.join(_PLOTS)}, unlike {self.out}; a skeleton's "
                 "file needs --skeleton."

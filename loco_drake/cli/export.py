@@ -12,7 +12,7 @@ from loco_drake.cli.options import (
     Robot,
     option,
 )
-from loco_drake.cli.output import do_all, print_table, write_json
+from loco_drake.cli.output import check_output, do_all, print_table, write_json
 from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.motion.gaits import parse_schedule
 
@@ -81,6 +81,7 @@ class Export:
         ):
             if path is not None and path.suffix != suffix:
                 raise InputError(f"--{name} must end in {suffix}, not {str(path)!r}.")
+        check_output(out)
         if self.plans is None and (self.gait, self.duration) != (None, None):
             raise InputError("--gait and --duration are of a plan: add --plans.")
         if self.plans is not None:

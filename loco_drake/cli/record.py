@@ -63,24 +63,29 @@ class Record:
         motions = read_motions(robot, self.references)
         actor = load_actor(policy_path(robot, self.policy), robot)
         solver = LegSolver(robot, FPS)
-        figures = {}
-        with single_thread():
-            for path in output.tracked(motions, "Recording", len(motions)):
-                motion = motions[path]
-                figures[path.stem] = self._one(path, motion, robot, actor, solver)
-        written = {k: f for k, f in figures.items() if f["written"]}
-        rows = [
-            [k, f"{f['normalized_return']:.1f}", f"{f['momentum_error']:.3f}"]
-            for k, f in written.items()
-        ]
-        title = f"Motion files in {self.out}: {len(rows)} of {len(motions)}"
+        figures: dict[str, dict[str, Any]] = {}
+
+        def work() -> None:
+            with single_thread():
+                for path in output.tracked(motions, "Recording", len(motions)):
+                    motion = motions[path]
+                    figures[path.stem] = self._one(path, motion, robot, actor, solver)
+
         output.do_all(
-            lambda: output.print_table(
-                title, ["motion", "return", "momentum error"], rows
-            ),
+            work,
+            lambda: self._show(figures, len(motions)),
             lambda: output.write_json(self.json, figures),
         )
-        return 0 if rows else 1
+        return 0 if any(f["written"] for f in figures.values()) else 1
+
+    def _show(self, figures: dict[str, dict[str, Any]], total: int) -> None:
+        rows = [
+            [k, f"{f['normalized_return']:.1f}", f"{f['momentum_error']:.3f}"]
+            for k, f in figures.items()
+            if f["written"]
+        ]
+        title = f"Motion files in {self.out}: {len(rows)} of {total}"
+        output.print_table(title, ["motion", "return", "momentum error"], rows)
 
     def _one(
         self,

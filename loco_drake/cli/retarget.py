@@ -127,7 +127,19 @@ class Retarget:
         out = self.out or Path("motions") / f"{robot.name}{variant.suffix}"
         output.check_output(out, folder=True)
         done = retarget_segments(segments, robot, out, split, self.workers, variant)
-        outcomes = list(output.tracked(done, "Retargeting", len(segments)))
+        outcomes: list[Outcome] = []
+        statuses = []
+        # A disk that is full by then keeps nothing from being told of what was done.
+        output.do_all(
+            lambda: outcomes.extend(output.tracked(done, "Retargeting", len(segments))),
+            lambda: statuses.append(self._tell(robot.name, out, outcomes, split)),
+        )
+        return statuses[0]
+
+    def _tell(
+        self, robot: str, out: Path, outcomes: "list[Outcome]", split: "Split | None"
+    ) -> int:
+        """Prints and writes what came of the stretches; returns the exit status."""
         failed = [outcome for outcome in outcomes if outcome.error is not None]
         if self.file is not None and failed:
             raise InputError(str(failed[0].error))
@@ -144,7 +156,7 @@ class Retarget:
             lambda: print_table(title, ["clip", *columns], rows),
             lambda: output.print_warnings(doubtful),
             lambda: output.write_json(self.json, figures),
-            lambda: self._steer(robot.name, outcomes, split),
+            lambda: self._steer(robot, outcomes, split),
             lambda: self._cut(outcomes, split, out.parent / f"{out.name}-trajectories"),
             lambda: output.print_failed((o.segment.name, str(o.error)) for o in failed),
         )
