@@ -22,7 +22,9 @@ class RunsList:
     """
 
     # Folder to look in, at any depth.
-    folder: Annotated[Path, tyro.conf.Positional, option(metavar="[DIR]")] = Path("runs")
+    folder: Annotated[Path, tyro.conf.Positional, option(metavar="[DIR]")] = Path(
+        "runs"
+    )
     json: Json = None
     seed: UnusedSeed = 0
 
