@@ -168,6 +168,7 @@ class Drive:
                     "duration_s": simulated if duration is None else duration,
                     "simulated_s": simulated,
                     "fell": rollout.fell,
+                    "interrupted": stop.is_set(),
                     "falls": driven.falls,
                     **tracking_metrics(rollout),
                     **drive_scores(get_robot(header["robot"]), driven),
