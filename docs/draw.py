@@ -36,12 +36,13 @@ from loco_drake.evaluation.gait_choice_picture import choice_figure
 from loco_drake.evaluation.report.results import load_results, results_dir
 from loco_drake.evaluation.robustness_pictures import curves_figure
 from loco_drake.evaluation.steering_pictures import grid_figure, steering_figures
-from loco_drake.evaluation.tracking import Recorder, dress
+from loco_drake.evaluation.tracking import Recorder
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.ground import AddGround
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS, AddRobotModel, get_robot
+from loco_drake.models.scenery import dress
 from loco_drake.models.shipped import results_path
 from loco_drake.motion.gaits import LABELS, parse_schedule
 from loco_drake.motion.motion import FPS
@@ -84,12 +85,11 @@ def robot(
         reference=GeneratedReference(gait=gait, seed=seed),
         policy=TrainedPolicy(weights=policy),
     )
-    recorder = Recorder(scenario, meshcat)
+    recorder = Recorder(scenario, meshcat, follow=True)
     recorder.start()
-    rollout, _ = recorder.run(time)
+    recorder.run(time)
     recorder.diagram.ForcedPublish(recorder.context)
-    x, y, _ = rollout.state[-1, 4:7]
-    meshcat.SetCameraPose([x + 0.75, y - 0.95, 0.5], [x + 0.02, y, 0.2])
+    meshcat.SetCameraPose([0.75, -0.95, 0.5], [0.02, 0.0, 0.2])
     take_picture(meshcat, png, size)
 
 

@@ -28,11 +28,14 @@ _FOOT_DISSIPATION = 1.0
 TILE = 0.5  # m; shows at a glance how far and how fast a robot goes
 FLOOR_Z = -0.001  # m; a hair below 0, where Meshcat has a grid of its own
 _TILES = 60  # along each side
+_FAR = 60.0  # m; from the middle to where plain floor around the tiles ends
 _MATERIALS = """
 newmtl light
 Kd .62 .64 .67
 newmtl dark
 Kd .53 .55 .58
+newmtl far
+Kd .575 .595 .625
 """
 
 
@@ -107,7 +110,10 @@ def SetGround(
 
 
 def floor_mesh() -> Mesh:
-    """Returns the floor as a mesh, since other Drake shapes have one colour."""
+    """Returns the floor as a mesh, since other Drake shapes have one colour.
+
+    Around its tiles lies plain floor, which ends where nobody sees it.
+    """
     side = _TILES + 1
     obj = ["mtllib floor.mtl"]
     corners = [(k - _TILES / 2) * TILE for k in range(side)]
@@ -121,6 +127,13 @@ def floor_mesh() -> Mesh:
                 k = i * side + j + 1
                 around = (k, k + side, k + side + 1, k + 1)
                 obj.append("f " + " ".join(f"{corner}//1" for corner in around))
+    near = _TILES * TILE / 2
+    obj.append("usemtl far")
+    for k, (cos, sin) in enumerate(((1, 0), (0, 1), (-1, 0), (0, -1))):
+        for x, y in ((near, near), (near, -near), (_FAR, -_FAR), (_FAR, _FAR)):
+            obj.append(f"v {x * cos - y * sin} {x * sin + y * cos} 0")
+        first = side**2 + 4 * k + 1
+        obj.append("f " + " ".join(f"{first + corner}//1" for corner in range(4)))
     return Mesh(
         InMemoryMesh(
             mesh_file=MemoryFile("\n".join(obj), ".obj", "floor.obj"),

@@ -15,8 +15,6 @@ from pydrake.systems.framework import (
     LeafSystem,
     OutputPort,
 )
-from pydrake.systems.lcm import ApplyLcmBusConfig
-from pydrake.visualization import ApplyVisualizationConfig
 
 from loco_drake.common.errors import InputError
 from loco_drake.control.actor import load_actor
@@ -39,8 +37,8 @@ from .control import (
     TrackingReward,
 )
 from .domain import Actuation, Pushes, Sensors
+from .drawing import AddDrawing
 from .gait_selector import GaitSelector, measured_gaits
-from .keypoint_visualizer import KeypointVisualizer
 from .scenario import (
     ExternalTargets,
     GeneratedReference,
@@ -105,8 +103,9 @@ def MakeLocomotionDiagram(
     The subsystems are named plant, scene_graph, robot_state, reference, steering,
     smoother, observation, policy, joint_targets, plan_state and reward; a generated
     reference that is steered adds gait_selector, and the scenario's disturbances add
-    actuation, pushes and sensors. ``meshcat`` shows the robot and the
-    plan's keypoints.
+    actuation, pushes and sensors. ``meshcat`` shows the robot, the
+    plan's keypoints, and contact forces if the scenario's visualization publishes
+    contacts.
 
     A robot must start on its plan: use :func:`.simulator.MakeSimulator` and
     :func:`.simulator.StartEpisode`. Drake never frees a diagram that contains systems
@@ -134,7 +133,7 @@ def AddLocomotion(
     Args:
         builder: the builder of a diagram that has no plant yet.
         scenario: the scenario.
-        meshcat: where to draw the robot and the plan's keypoints.
+        meshcat: where to draw the robot and the plan's keypoints, see :mod:`.drawing`.
         pre_finalize: called with plant and scene graph; may add bodies to the plant.
 
     Raises:
@@ -170,17 +169,8 @@ def AddLocomotion(
     made.outputs["state"] = state
     made.outputs["net_actuation"] = plant.get_net_actuation_output_port(instance)
     if meshcat is not None:
-        ApplyVisualizationConfig(
-            scenario.visualization,
-            builder,
-            # A null bus disables publishing to LCM.
-            lcm_buses=ApplyLcmBusConfig({"default": None}, builder),
-            meshcat=meshcat,
-        )
-        if "plan" in made.outputs:
-            period = scenario.visualization.publish_period
-            drawing = KeypointVisualizer(robot, meshcat, period=period)
-            _Add(builder, "plan_visualizer", drawing, plan=made.outputs["plan"])
+        plan = made.outputs.get("plan")
+        AddDrawing(builder, robot, plant, scenario.visualization, meshcat, plan)
     return made
 
 

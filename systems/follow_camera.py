@@ -7,6 +7,7 @@ from pydrake.systems.framework import Context, LeafSystem
 from loco_drake.control.state import POSITION
 from loco_drake.models.ground import FLOOR_Z, TILE
 from loco_drake.models.robots import Robot
+from loco_drake.models.scenery import EYE, TARGET
 
 _FLOOR = "/drake/illustration/floor"
 # m; the floor's pattern repeats every two tiles.
@@ -36,7 +37,7 @@ class FollowCamera(LeafSystem):
     def __init__(self, robot: Robot, meshcat: Meshcat, period: float = 1 / 64) -> None:
         super().__init__()
         self._meshcat = meshcat
-        meshcat.SetCameraPose([0.5, -1.8, 0.8], [0.0, 0.0, 0.2])
+        meshcat.SetCameraPose(EYE, TARGET)
         size = 13 + 2 * len(robot.joint_names)
         self._state = self.DeclareVectorInputPort("state", size)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._publish)

@@ -18,6 +18,8 @@ _REAR = Rgba(0.9, 0.1, 0.1)
 _TRUNK = Rgba(0.1, 0.7, 0.2)
 NAMES = ("FL_toe", "FR_toe", "RL_toe", "RR_toe", "withers", "hip")
 COLORS = (_FRONT, _FRONT, _REAR, _REAR, _TRUNK, _TRUNK)
+# Over the radius of a foot, so that a point is seen around the toe that is there.
+POINT = 1.5
 
 
 class KeypointVisualizer(PlanFollower):
@@ -41,7 +43,7 @@ class KeypointVisualizer(PlanFollower):
         self._meshcat = meshcat
         self._paths = [f"{path}/{name}" for name in NAMES]
         for name, color in zip(self._paths, COLORS, strict=True):
-            meshcat.SetObject(name, Sphere(robot.foot_radius), color)
+            meshcat.SetObject(name, Sphere(POINT * robot.foot_radius), color)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._publish)
         self.DeclareForcedPublishEvent(self._publish)
 

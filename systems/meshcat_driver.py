@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from html import escape
 from math import isfinite
 
 import numpy as np
@@ -42,33 +41,6 @@ _PUSH_PAUSE = 0.5  # s; a key that is held down repeats itself
 # point right or down, and the command forward or left.
 _AXES = ((1, -2.0), (0, -0.6), (2, -1.5))
 _DEAD_ZONE = 0.1
-
-_TEXT = (
-    '<div style="position:fixed;left:92px;top:6px;font:15px/1.4 sans-serif;'
-    'color:#222;text-shadow:none;white-space:pre;pointer-events:none">{}</div>'
-)
-
-
-class MeshcatText:
-    """Text in the upper left corner of Meshcat's page.
-
-    Meshcat has no text of its own, but shows the name of a button as HTML. It also puts
-    the name into JavaScript, where a quote or a new line would be an error.
-    """
-
-    def __init__(self, meshcat: Meshcat) -> None:
-        self._meshcat = meshcat
-        self._shown = ""
-
-    def show(self, *lines: str) -> None:
-        """Replaces what is shown."""
-        text = _TEXT.format("<br>".join(map(escape, lines)))
-        if text == self._shown:
-            return
-        if self._shown:
-            self._meshcat.DeleteButton(self._shown)
-        self._meshcat.AddButton(text)
-        self._shown = text
 
 
 class ButtonPresses:

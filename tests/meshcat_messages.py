@@ -1,6 +1,7 @@
 """What Meshcat's page sends when a control is used, in MessagePack."""
 
 import base64
+import json
 import re
 import struct
 
@@ -109,3 +110,9 @@ def animation(page):
         for part in command["animations"]
         for track in part["clip"]["tracks"]
     }
+
+
+def captions(page):
+    """Returns time in s and HTML of each caption of a saved page's replay."""
+    (data,) = re.findall(r"atob\(&quot;(.*?)&quot;\)", page)
+    return json.loads(base64.b64decode(data))

@@ -88,6 +88,8 @@ class Drive:
     # Show the robot in the browser, at most at real-time speed. Needed unless there is
     # a table of commands or a recorded drive.
     meshcat: bool = True
+    # Show contact forces as arrows.
+    forces: bool = False
     port: Port = None
     html: Html = None
     # YAML file of a scenario.
@@ -110,6 +112,7 @@ class Drive:
             tracking_metrics,
         )
         from loco_drake.models.robots import get_robot
+        from loco_drake.models.scenery import publish_replay
         from loco_drake.systems.command_source import CommandSource
         from loco_drake.systems.meshcat_driver import MeshcatDriver
 
@@ -136,7 +139,11 @@ class Drive:
         # Unless Drake waits.
         waits = self.meshcat and scenario.simulator.target_realtime_rate == 0
         pace = Pace(recorder, waits)
-        with stop_requests() as stop, DriveView(recorder, meshcat, driver) as view:
+        forces = scenario.visualization.publish_contacts
+        with (
+            stop_requests() as stop,
+            DriveView(recorder, meshcat, driver, forces) as view,
+        ):
             if steps is None:
                 print("Drive on that page; its Stop button or Ctrl-C ends.", flush=True)
 
@@ -182,9 +189,8 @@ class Drive:
 
         def save_replay() -> None:
             if meshcat is not None and self.html is not None:
-                meshcat.StopRecording()
-                meshcat.PublishRecording()
-                save_page(meshcat, self.html)
+                publish_replay(meshcat)
+                save_page(meshcat, self.html, view.replay())
 
         # First what cannot be had again.
         do_all(save_record, report, lambda: write_json(self.json, figures), save_replay)
@@ -246,6 +252,7 @@ class Drive:
             policy=self.policy,
         )
         scenario.disturbances.pushes = True
+        scenario.visualization.publish_contacts |= self.forces
         if scenario.plant.contact == "cenic":
             # Pictures at other times would change the steps of the integrator.
             scenario.visualization.publish_period = PLAN_DT

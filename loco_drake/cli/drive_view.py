@@ -1,28 +1,25 @@
 """What a driver sees of a drive: on Meshcat's page and in the terminal."""
 
-from collections import deque
+from dataclasses import replace
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-import numpy as np
 from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from loco_drake.cli.run_view import RunView
 from loco_drake.common.arrays import Array
-from loco_drake.common.rotations import yaw_of
 from loco_drake.control.driving import COMMAND, GAIT, PUSH, RESET
-from loco_drake.control.plan import PLAN_DT
-from loco_drake.control.state import ORIENTATION, VELOCITY, split
 from loco_drake.motion.gaits import ANY, ANY_INDEX
-from loco_drake.systems.meshcat_driver import MeshcatDriver, MeshcatText
+from loco_drake.systems.meshcat_driver import MeshcatDriver
+from loco_drake.viewing.captions import Caption
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
 
     from loco_drake.evaluation.tracking import Recorder
 
-_PERIOD = 0.5  # s between updates
 _WINDOW = 5.0  # s; of the return that is shown
 _NOTED = 3.0  # s for which what happened is shown
 _FELL = "it fell: R puts it upright"
@@ -31,12 +28,13 @@ _HINT = "W S A D Q E drive, Space halts; see also Open Controls"
 
 
 class DriveView:
-    """Shows command, what is followed, gait, speed and return, twice a second.
+    """Shows what :class:`RunView` does, command, what is followed, and what happened.
 
     Args:
         recorder: simulates the drive.
         meshcat: its page, if there is one.
         driver: the controls on the page, if there are any.
+        forces: whether the page shows contact forces.
     """
 
     def __init__(
@@ -44,17 +42,17 @@ class DriveView:
         recorder: "Recorder",
         meshcat: "Meshcat | None",
         driver: MeshcatDriver | None,
+        forces: bool = False,
     ) -> None:
         self._recorder, self._driver = recorder, driver
-        self._page = None if meshcat is None else MeshcatText(meshcat)
+        self._view = RunView(recorder, meshcat, window=_WINDOW, forces=forces)
         console = Console(stderr=True)
         self._line = (
             Live(console=console, auto_refresh=False, transient=True)
             if console.is_terminal
             else None
         )
-        self._rewards: deque[float] = deque(maxlen=round(_WINDOW / PLAN_DT))
-        self._speeds: deque[float] = deque(maxlen=round(_PERIOD / PLAN_DT))
+        self._seen = meshcat is not None or self._line is not None
         self._happened, self._until = "", 0.0
 
     def __enter__(self) -> Self:
@@ -72,54 +70,54 @@ class DriveView:
             self._line.stop()
 
     def update(self, now: float, orders: Array) -> None:
-        """Takes note of a control period and shows the last ones when it is time.
+        """Takes note of a control period, and shows it when it is time.
 
         Args:
             now: the simulation's time, s.
             orders: those of the control period, shape (ORDERS,).
         """
-        if self._page is None and self._line is None:
+        if not self._seen:
             return
-        diagram, context = self._recorder.diagram, self._recorder.context
-        q, v = split(diagram.GetOutputPort("state").Eval(context))
-        yaw, velocity = yaw_of(q[ORIENTATION]), v[VELOCITY]
-        self._speeds.append(velocity[0] * np.cos(yaw) + velocity[1] * np.sin(yaw))
-        reward = diagram.GetOutputPort("reward_terms").Eval(context).sum()
-        self._rewards.append(0.0 if self._recorder.fell else float(reward))
         if orders[PUSH]:
             self._note(f"pushed by {abs(orders[PUSH]):g} N s", now)
         if orders[RESET]:
             self._note("put upright", now)
-        if round(now / PLAN_DT) % round(_PERIOD / PLAN_DT):
+        if not self._view.measure(now):
             return
-        lines = self._lines(now, orders)
-        if self._page is not None:
-            self._page.show(*lines)
+        caption = self._caption(now, orders)
+        self._view.tell(now, caption)
         if self._line is not None:
-            text = Text("  |  ".join(lines), no_wrap=True, overflow="ellipsis")
-            self._line.update(text, refresh=True)
+            text = "  |  ".join((caption.title, *caption.lines))
+            self._line.update(
+                Text(text, no_wrap=True, overflow="ellipsis"), refresh=True
+            )
+
+    def replay(self) -> str:
+        """See :meth:`RunView.replay`."""
+        return self._view.replay()
 
     def _note(self, text: str, now: float) -> None:
         self._happened, self._until = text, now + _NOTED
 
-    def _lines(self, now: float, orders: Array) -> list[str]:
+    def _caption(self, now: float, orders: Array) -> Caption:
         diagram, context = self._recorder.diagram, self._recorder.context
         followed = diagram.GetOutputPort("followed").Eval(context)
         chosen = f"{ANY}: " if orders[GAIT] == ANY_INDEX else ""
+        run = self._view.caption(now)
         lines = [
+            *run.lines,
             f"command {_command(orders[COMMAND])}",
             f"followed {_command(followed)}",
-            f"{chosen}{self._recorder.gait}  {np.mean(self._speeds):.2f} m/s  "
-            f"return {100 * np.mean(self._rewards):.0f}  {now:.1f} s",
         ]
-        notes = [] if self._driver is None else list(self._driver.notes)
+        if self._driver is not None:
+            lines += self._driver.notes
         if self._recorder.fell:
-            notes.append("it fell" if self._driver is None else _FELL)
+            lines.append("it fell" if self._driver is None else _FELL)
         if now < self._until:
-            notes.append(self._happened)
+            lines.append(self._happened)
         if self._driver is not None and now < _HINT_UNTIL:
-            notes.append(_HINT)
-        return [*lines, *notes]
+            lines.append(_HINT)
+        return replace(run, title=f"{chosen}{run.title}", lines=tuple(lines))
 
 
 def _command(command: Array) -> str:

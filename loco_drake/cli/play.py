@@ -87,8 +87,7 @@ class Play:
             if self.html is not None:
                 from loco_drake.viewing.replay import record
 
-                record(stage, meshcat)
-                save_page(meshcat, self.html)
+                save_page(meshcat, self.html, record(stage, meshcat))
         if self.video is not None:
             make_video(self.video, scenes)
         if live:
@@ -119,9 +118,7 @@ class Play:
             motion = load_motion(path)
             robot = _robot_of(motion, path, robots)
             clip = None if folder is None else _clip_of(motion, path, folder)
-            # Meshcat puts it into JavaScript.
-            title = one_line(f"{motion.label}  {path.name}").replace("\\", "/")
-            takes.append(take_of_motion(title, motion, robot, clip))
+            takes.append(take_of_motion(one_line(path.name), motion, robot, clip))
             row = {
                 "file": str(path),
                 "robot": motion.robot,

@@ -20,10 +20,12 @@ from loco_drake.cli.output import do_all, say, write_json
 from loco_drake.cli.simulation import (
     Pace,
     check_duration,
+    in_terminal,
     override,
     print_figures,
     save_page,
     start_meshcat,
+    stay,
     use_weights,
 )
 from loco_drake.cli.video import make_video, prepare_video
@@ -78,6 +80,10 @@ class Simulate:
     # Keep the robot in the middle of the page, live and in the replay; otherwise the
     # camera stays, and the replay shows the whole path.
     follow: bool = True
+    # Show contact forces as arrows.
+    forces: bool = False
+    # In a terminal, keep the page and its replay until Ctrl-C.
+    wait: bool = True
     port: Port = None
     html: Html = None
     video: Video = None
@@ -96,10 +102,12 @@ class Simulate:
 
     def run(self) -> int:
         """Simulates, prints and writes; returns 1 if it was stopped early, else 0."""
+        from loco_drake.cli.run_view import RunView
         from loco_drake.common.run_folder import stop_requests
         from loco_drake.control.plan import PLAN_DT
         from loco_drake.control.state import POSITION
         from loco_drake.evaluation import tracking
+        from loco_drake.models.scenery import frame, publish_replay
 
         scenario, duration, motion = self._read()
         if self.video is not None:
@@ -108,6 +116,8 @@ class Simulate:
         if self.meshcat or self.html is not None:
             meshcat = start_meshcat(self.port, announce=self.meshcat)
         scenario.plant.visual = meshcat is not None
+        shown = scenario.visualization
+        shown.publish_contacts |= self.forces
         recorder = tracking.Recorder(scenario, meshcat, follow=self.follow)
         if self.command is not None:
             port = recorder.diagram.GetInputPort("command")
@@ -118,9 +128,16 @@ class Simulate:
         # Unless Drake waits.
         waits = self.meshcat and scenario.simulator.target_realtime_rate == 0
         pace = Pace(recorder, waits)
+        view = RunView(
+            recorder,
+            meshcat,
+            forces=shown.publish_contacts,
+            gait=None if motion is None or motion.gait_changes else str(motion.label),
+        )
         with stop_requests() as stop:
 
             def after_step(now: float) -> bool:
+                view.update(now)
                 pace.keep(now)
                 return not stop.is_set()
 
@@ -144,12 +161,14 @@ class Simulate:
         def save_replay() -> None:
             if meshcat is None:
                 return
-            meshcat.StopRecording()
-            meshcat.PublishRecording()
+            if rollout.fell:
+                view.fell(recorder.context.get_time())
+            publish_replay(meshcat)
             if not self.follow:
-                tracking.frame(meshcat, rollout.state[POSITION])
+                frame(meshcat, rollout.state[POSITION])
+            corner = view.replay()
             if self.html is not None:
-                save_page(meshcat, self.html)
+                save_page(meshcat, self.html, corner)
 
         def save_video() -> None:
             if self.video is not None:
@@ -165,6 +184,8 @@ class Simulate:
             save_replay,
             save_video,
         )
+        if self.meshcat and self.wait and in_terminal() and not stop.is_set():
+            stay()
         return int(stop.is_set())
 
     def _read(self) -> "tuple[Scenario, float, Motion | None]":

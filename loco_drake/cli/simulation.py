@@ -81,7 +81,7 @@ def start_meshcat(port: int | None, *, announce: bool) -> "Meshcat":
     Raises:
         InputError: if there can be no such port.
     """
-    from loco_drake.evaluation.tracking import dress
+    from loco_drake.models.scenery import dress
 
     meshcat = _open_meshcat(port)
     dress(meshcat)
@@ -104,10 +104,32 @@ def _open_meshcat(port: int | None) -> "Meshcat":
         return Meshcat()
 
 
-def save_page(meshcat: "Meshcat", path: Path) -> None:
-    """Writes Meshcat's page with what was recorded."""
+def save_page(meshcat: "Meshcat", path: Path, corner: str) -> None:
+    """Writes Meshcat's page with what was recorded.
+
+    Args:
+        meshcat: what shows the page.
+        path: the file.
+        corner: HTML that the page has besides.
+    """
+    begin, end = meshcat.StaticHtml().rsplit("</body>", 1)
     with atomic_path(path) as temporary:
-        temporary.write_text(meshcat.StaticHtml())
+        temporary.write_text(f"{begin}{corner}\n</body>{end}")
+
+
+def in_terminal() -> bool:
+    """Returns whether somebody is there who can press Ctrl-C."""
+    return sys.stdin.isatty() and sys.stdout.isatty()
+
+
+def stay() -> None:
+    """Waits for Ctrl-C."""
+    print("The replay is on that page until Ctrl-C.", flush=True)
+    try:
+        while True:
+            time.sleep(1.0)
+    except KeyboardInterrupt:
+        pass
 
 
 class Pace:

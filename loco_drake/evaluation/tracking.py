@@ -273,23 +273,3 @@ def effort_metrics(rollout: Rollout, robot: Robot, damping: Array) -> dict[str, 
         "speed_saturation": float(np.mean(np.abs(v) >= robot.joint_speed_limits)),
         "cost_of_transport": power / (robot.mass * GRAVITY * max(speed, 1e-3)),
     }
-
-
-def dress(meshcat: Meshcat) -> None:
-    """Sets the sky and the initial camera of the scene."""
-    meshcat.SetProperty("/Background", "top_color", [0.75, 0.83, 0.92])
-    # These would be drawn through the floor.
-    meshcat.SetProperty("/Grid", "visible", False)
-    meshcat.SetProperty("/Axes", "visible", False)
-    meshcat.SetCameraPose([1.5, -2.5, 1.0], [1.0, 0.0, 0.3])
-
-
-def frame(meshcat: Meshcat, p_WB: Array) -> None:
-    """Moves the camera to show all of the base's path, shape (N, 3)."""
-    middle = (p_WB.min(axis=0) + p_WB.max(axis=0)) / 2
-    along = p_WB[-1, :2] - p_WB[0, :2]
-    length = float(np.hypot(*along))
-    side = np.array([along[1], -along[0]]) / max(length, 1e-9)
-    away = max(1.8, 0.6 * length)
-    eye = [*(middle[:2] + away * side), 0.3 + 0.4 * away]
-    meshcat.SetCameraPose(eye, [*middle[:2], 0.25])

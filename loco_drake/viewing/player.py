@@ -1,11 +1,14 @@
 """The controls of a player on Meshcat's page."""
 
+from dataclasses import replace
 from math import isfinite
 
 from pydrake.geometry import Meshcat
 
-from loco_drake.systems.meshcat_driver import ButtonPresses, MeshcatText
+from loco_drake.systems.meshcat_driver import ButtonPresses
+from loco_drake.viewing.captions import PageText
 from loco_drake.viewing.stage import Stage, viewpoint
+from loco_drake.viewing.takes import caption_of
 
 PAUSE = "Pause (Space)"
 BACK, FORWARD = "Frame back (left)", "Frame on (right)"
@@ -33,7 +36,7 @@ class Player:
 
     def __init__(self, stage: Stage, meshcat: Meshcat) -> None:
         self._stage, self._meshcat = stage, meshcat
-        self._text = MeshcatText(meshcat)
+        self._text = PageText(meshcat, stage.legend)
         self._number, self._time = 0, 0.0
         self._told = 0.0  # s since slider and text were updated
         self._drawn = (-1, -1)
@@ -41,7 +44,7 @@ class Player:
         for name, key in BUTTONS.items():
             meshcat.AddButton(name, key)
         self._presses = ButtonPresses(meshcat, BUTTONS)
-        meshcat.SetCameraPose(*viewpoint(stage.scenes))
+        meshcat.SetCameraPose(*viewpoint(stage.scenes, page=True))
         self.select(0)
 
     @property
@@ -118,10 +121,7 @@ class Player:
             return
         self._told = 0.0
         self._shown = self._meshcat.SetSliderValue(SLIDER, self.frame)
-        count = len(self._stage.scenes)
-        place = f"{self._number + 1} of {count}: " if count > 1 else ""
-        paused = "  paused" if self.paused else ""
-        self._text.show(
-            f"{place}{self._scene.title}",
-            f"{self._time:.2f} s  frame {self.frame} of {len(self._scene)}{paused}",
-        )
+        said = caption_of(self._stage.scenes, self._number, self._time)
+        frame = f"frame {self.frame} of {len(self._scene)}"
+        paused = ("paused",) if self.paused else ()
+        self._text.show(replace(said, lines=(*said.lines, frame, *paused)))

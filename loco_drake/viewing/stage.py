@@ -22,7 +22,8 @@ from pydrake.systems.framework import DiagramBuilder
 
 from loco_drake.common.arrays import Array
 from loco_drake.models.ground import FLOOR_Z, TILE, floor_mesh
-from loco_drake.systems.keypoint_visualizer import COLORS, NAMES
+from loco_drake.systems.keypoint_visualizer import COLORS, NAMES, POINT
+from loco_drake.viewing.captions import legend
 from loco_drake.viewing.figure import AWAY, AddFigure, Figure, put_body
 from loco_drake.viewing.rendering import AddRenderEngine
 from loco_drake.viewing.takes import Scene
@@ -30,8 +31,8 @@ from loco_drake.viewing.takes import Scene
 # m; the floor's pattern repeats every two tiles. It steps seldom, since a page draws
 # what lies between two frames.
 _FLOOR_STEP = 10 * TILE
-# Over the radius of a foot, so that a point is seen around the toe that is there.
-_POINT = 1.3
+# Share of the distance from which a video looks.
+_PAGE_NEARER = 0.7
 
 
 class Stage:
@@ -65,7 +66,7 @@ class Stage:
             (name, k): AddFigure(plant, robots[name], f"figure{number}")
             for number, (name, k) in enumerate(roles)
         }
-        radius = _POINT * max(robot.foot_radius for robot in robots.values())
+        radius = POINT * max(robot.foot_radius for robot in robots.values())
         sets = max(sum(t.points is not None for t in s.takes) for s in self.scenes)
         points = [_AddPoints(plant, f"points{k}", radius) for k in range(sets)]
         floor = _AddFloor(plant)
@@ -86,6 +87,11 @@ class Stage:
         self._plant_context = plant.GetMyMutableContextFromRoot(self._context)
         self._query_port = scene_graph.get_query_output_port()
         self._query_context = scene_graph.GetMyContextFromRoot(self._context)
+
+    @property
+    def legend(self) -> str:
+        """HTML that says what the colours of points mean, see :mod:`.captions`."""
+        return legend("recording", points=bool(self._points))
 
     @property
     def query_object(self) -> QueryObject:
@@ -127,12 +133,16 @@ class Stage:
         self._diagram.ForcedPublish(self._context)
 
 
-def viewpoint(scenes: Sequence[Scene]) -> tuple[Array, Array]:
-    """Returns from where to look at scenes, and at what, m, two of shape (3,)."""
+def viewpoint(scenes: Sequence[Scene], *, page: bool = False) -> tuple[Array, Array]:
+    """Returns from where to look at scenes, and at what, m, two of shape (3,).
+
+    A ``page`` shows more around the middle than a video does, so it looks from nearer.
+    """
     height = max(take.robot.stand_height for s in scenes for take in s.takes)
     width = max(scene.width for scene in scenes)
-    # For one robot as in a simulation; more of them from further behind and above.
-    eye = height * np.array([1.6, -5.8, 2.6]) + width * np.array([0.6, -0.5, 0.5])
+    away = height * np.array([1.6, -5.8, 2.1]) * (_PAGE_NEARER if page else 1.0)
+    # More than one robot from further behind and above.
+    eye = away + width * np.array([0.6, -0.5, 0.5])
     return eye, np.array([0.0, 0.0, 0.7 * height])
 
 

@@ -19,7 +19,11 @@ from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.motion.momentum import positions
 from loco_drake.motion.motion import Motion
 from loco_drake.retargeting.scaling import resample
+from loco_drake.viewing.captions import Caption
 
+# s around a time of which the speed is told, and after a change of gait in which it
+# stands out.
+_AROUND, _CHANGING = 0.5, 2.0
 # Width of the lane that a robot has for itself, over its height.
 _LANE = 2.2
 
@@ -31,11 +35,12 @@ class Take:
     Points are the toes FL, FR, RL, RR, the withers and the hip.
     """
 
-    title: str  # what the page calls it
+    title: str  # what the page calls it, beside its gait
     robot: Quadruped
     fps: float  # frames/s
     q: Array  # [q_WB as w x y z, p_WB, joints], m and rad, shape (T, 7 + J)
     points: Array | None = None  # p_WK, m, shape (T, 6, 3)
+    gaits: tuple[tuple[int, str], ...] = ()  # first frame and label of each
 
     def __len__(self) -> int:
         return len(self.q)
@@ -48,6 +53,17 @@ class Take:
     def index(self, time: float) -> int:
         """Returns the frame nearest to ``time`` in s, the last one if it is over."""
         return min(max(round(time * self.fps), 0), len(self) - 1)
+
+    def gait(self, time: float) -> tuple[str, bool]:
+        """Returns the gait at ``time`` in s, and whether it has just changed."""
+        frame = self.index(time)
+        begun = [gait for gait in self.gaits if gait[0] <= frame]
+        if not begun:
+            return "", False
+        (start, name), before = begun[-1], begun[-2:-1]
+        if not before or frame - start > _CHANGING * self.fps:
+            return name, False
+        return f"{before[0][1]} → {name}", True
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,10 +78,23 @@ class Scene:
     def __len__(self) -> int:
         return round(self.duration * self.fps) + 1
 
-    @property
-    def title(self) -> str:
-        """The titles of its takes, from right to left."""
-        return "  |  ".join(take.title for take in self.takes)
+    def caption(self, time: float) -> Caption:
+        """Returns what there is to say at ``time`` in s, takes from right to left."""
+        gaits = [take.gait(time) for take in self.takes]
+        names = [
+            "  ".join(filter(None, (gait, take.title)))
+            for (gait, _), take in zip(gaits, self.takes, strict=True)
+        ]
+        half, frame = round(_AROUND / 2 * self.fps), round(time * self.fps)
+        begin = min(max(frame - half, 0), len(self) - 1)
+        end = min(frame + half, len(self) - 1)
+        way = float(np.linalg.norm(self._path[end] - self._path[begin]))
+        speed = way * self.fps / max(end - begin, 1)
+        return Caption(
+            "  |  ".join(names),
+            (f"{time:.2f} s  {speed:.2f} m/s",),
+            any(changing for _, changing in gaits),
+        )
 
     @property
     def fps(self) -> float:
@@ -103,13 +132,20 @@ class Scene:
         return np.concatenate((start[None], start + np.cumsum(mean, axis=0)))
 
 
+def caption_of(scenes: Sequence[Scene], number: int, time: float) -> Caption:
+    """Returns what there is to say of one of several scenes at ``time`` in it, s."""
+    said = scenes[number].caption(time)
+    place = f"{number + 1} of {len(scenes)}: " if len(scenes) > 1 else ""
+    return replace(said, title=f"{place}{said.title}")
+
+
 def take_of_motion(
     title: str, motion: Motion, robot: Quadruped, clip: KeypointClip | None = None
 ) -> Take:
     """Returns a take that begins at the origin and heads along +x.
 
     Args:
-        title: what the page calls it.
+        title: what the page calls it, beside its gait.
         motion: the motion, of ``robot``.
         robot: the robot.
         clip: keypoints to show to the robot's left, in its size and time.
@@ -127,7 +163,9 @@ def take_of_motion(
         # A spline may end a frame before the motion, or after it.
         shown = np.minimum(np.arange(len(q)), len(points) - 1)
         points = points[shown] + np.array([0.0, _LANE * robot.stand_height, 0.0])
-    return Take(title, robot, motion.fps, q, points)
+    changes = motion.gait_changes or ((0, motion.label),)
+    gaits = tuple((frame, str(label)) for frame, label in changes)
+    return Take(title, robot, motion.fps, q, points, gaits)
 
 
 def one_by_one(takes: Sequence[Take]) -> tuple[Scene, ...]:

@@ -212,11 +212,21 @@ def test_the_line_shows_the_gait_that_is_walked(weights, tmp_path, monkeypatch):
     table.write_text(f"{head}0,0.1,0,0,any\n0.7,1.8,0,0,\n1.7,0.5,0,0,dog-pace\n")
     line = ("--commands", table, "--policy", weights / "calm.safetensors")
     drive(tmp_path, *line, "--duration", 3)
-    gaits = [line.split("  |  ")[2].split("  ")[0] for line in shown]
-    # Twice a second. The order counts at once, the gait when its plan is played.
+    titles, runs = zip(*(line.split("  |  ")[:2] for line in shown), strict=True)
+    times = [float(run.split(" s  ")[0]) for run in runs]
+    # Twice a second, and when the gait changes.
+    assert set(np.arange(1, 7) / 2) < set(times)
+    assert len(times) == 9
+    # The order counts at once, the gait when its plan is played; what has changed is
+    # told for 2 s.
     slow, fast = chosen(0.1, 1.8)
-    expected = [slow, slow, fast, fast, "dog-pace", "dog-pace"]
-    assert gaits == [f"any: {gait}" for gait in expected[:3]] + expected[3:]
+    changed = [f"{slow} → {fast}", f"{fast} → dog-pace"]
+    assert list(dict.fromkeys(titles)) == [
+        f"any: {slow}",
+        f"any: {changed[0]}",
+        changed[0],
+        changed[1],
+    ]
 
 
 @pytest.mark.parametrize(

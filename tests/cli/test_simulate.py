@@ -5,12 +5,14 @@ import socket
 import numpy as np
 import pytest
 
+from loco_drake.cli import simulate as command
 from loco_drake.cli.main import main
 from loco_drake.control.gait_choice import best_gait
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion_file import save_motion
 from loco_drake.systems.gait_selector import measured_gaits
+from tests.meshcat_messages import captions
 from tests.synthetic_motion import synthetic_motion
 from tests.viewing.pictures import (
     needs_renderer,
@@ -122,6 +124,39 @@ def test_port_in_use_and_replay(weights, tmp_path, monkeypatch, capsys):
     assert str(port) not in printed.out
     assert "<html" in page.read_text()[:1000]
     assert 1e6 < page.stat().st_size < 10e6
+
+
+def test_a_page_tells_the_gait_and_the_fall_of_its_time(weights, tmp_path):
+    page = tmp_path / "a.html"
+    line = ("--duration", 5, "--no-meshcat", "--html", page)
+    figures = simulate(tmp_path, *line, "--policy", weights / "wild.safetensors")
+    told = captions(page.read_text())
+    times = [time for time, _ in told]
+    assert times[0] == 0
+    assert set(np.arange(0.5, figures["simulated_s"], 0.5)) <= set(times)
+    for time, caption in told[:-1]:
+        for part in ("dog-trot</span>", f"{time:.1f} s  ", " m/s  return ", "plan: "):
+            assert part in caption
+    assert 0 <= times[-1] - figures["simulated_s"] < 0.03
+    assert "it fell</span>" in told[-1][1]
+
+
+@pytest.mark.parametrize(
+    ("options", "terminal", "waited"),
+    [("", True, 1), ("", False, 0), ("--no-wait", True, 0), ("--no-meshcat", True, 0)],
+)
+def test_the_page_stays_if_somebody_is_there(
+    options, terminal, waited, weights, tmp_path, monkeypatch
+):
+    waits = []
+    monkeypatch.setattr(command, "in_terminal", lambda: terminal)
+    monkeypatch.setattr(
+        command, "stay", lambda: waits.append((tmp_path / "figures.json").exists())
+    )
+    policy = weights / "calm.safetensors"
+    simulate(tmp_path, "--duration", 0.1, "--policy", policy, *options.split())
+    # With all figures written.
+    assert waits == [True] * waited
 
 
 @needs_renderer

@@ -11,7 +11,6 @@ from loco_drake.systems.meshcat_driver import (
     SLIDERS,
     STOP,
     MeshcatDriver,
-    MeshcatText,
 )
 from tests.meshcat_messages import click, gamepad, move
 
@@ -148,14 +147,3 @@ def test_sliders_beyond_their_ends_are_limited_visibly(meshcat, driver, value, f
     move(meshcat, FORWARD, value)
     assert driver.sample(0.1)[0] == forward
     assert driver.notes == ("command limited",)
-
-
-def test_text_is_one_button_whose_name_is_safe(meshcat):
-    text = MeshcatText(meshcat)
-    before = meshcat.GetButtonNames()
-    text.show("it's <b>", "2")
-    text.show("it's <b>", "3")
-    (name,) = set(meshcat.GetButtonNames()) - set(before)
-    assert "it&#x27;s &lt;b&gt;<br>3" in name
-    assert "'" not in name
-    assert "\n" not in name

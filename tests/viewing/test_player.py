@@ -125,7 +125,8 @@ def test_files_go_round_and_the_slider_gets_their_length(player, meshcat):
     click(meshcat, PREVIOUS)
     player.update(0.0)
     assert player.number == 1
-    assert "2 of 2: 2 s" in shown(meshcat)
+    assert "2 of 2: dog-trot  2 s" in shown(meshcat)
+    assert "0.80 m/s" in shown(meshcat)
 
 
 def test_the_slider_goes_to_a_frame_and_follows_when_it_plays(player, meshcat):

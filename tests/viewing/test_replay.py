@@ -4,7 +4,7 @@ from pydrake.geometry import Meshcat
 from loco_drake.viewing.replay import frame_times, record
 from loco_drake.viewing.stage import Stage
 from loco_drake.viewing.takes import one_by_one, take_of_motion
-from tests.meshcat_messages import animation
+from tests.meshcat_messages import animation, captions
 from tests.synthetic_motion import synthetic_motion
 
 
@@ -12,7 +12,16 @@ def test_a_page_holds_all_files_one_after_another_and_follows_the_robot(go2):
     motions = [synthetic_motion(seconds=s, speed=1.0) for s in (1.0, 2.0)]
     takes = [take_of_motion("a", motion, go2) for motion in motions]
     meshcat = Meshcat()
-    record(Stage(one_by_one(takes), meshcat), meshcat)
+    corner = record(Stage(one_by_one(takes), meshcat), meshcat)
+    told = captions(corner)
+    assert [time for time, _ in told] == sorted({*np.arange(13) / 4, 33 / 32})
+    for (time, caption), place in zip(told, 5 * [1] + 9 * [2], strict=True):
+        within = time - (place == 2) * 33 / 32
+        for part in (f"{place} of 2: dog-trot  a<", f"{within:.2f} s", "1.00 m/s"):
+            assert part in caption
+    recording = meshcat.get_mutable_recording()
+    assert recording.loop_mode() == recording.LoopMode.kLoopRepeat
+    assert recording.repetitions() > 1000
     tracks = animation(meshcat.StaticHtml())
     base = tracks["/drake/illustration/figure0/go2/base", ".position"]
     times, places = zip(*base, strict=True)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from loco_drake.common.rotations import quat_multiply, quat_rotate, yaw_of, yaw_quat
+from loco_drake.motion.gaits import parse_label
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.viewing.takes import one_by_one, side_by_side, take_of_motion
 from tests.synthetic_motion import synthetic_motion
@@ -61,3 +62,21 @@ def test_the_middle_of_one_take_is_its_base(go2):
     for time in (0.0, 0.5, 1.0):
         base = take.q[take.index(time), 4:6]
         np.testing.assert_allclose(scene.middle(time), base, atol=1e-12)
+
+
+def test_a_change_of_gait_is_told_for_two_seconds(go2):
+    motion = synthetic_motion(seconds=4.0, speed=0.5, turn=0.2)
+    changes = ((0, parse_label("dog-pace")), (50, parse_label("mpc-trot")))
+    (scene,) = one_by_one(
+        [take_of_motion("a", replace(motion, gait_changes=changes), go2)]
+    )
+    told = {time: scene.caption(time) for time in (0.0, 0.98, 1.0, 3.0, 3.02, 4.0)}
+    assert [(c.title, c.marked) for c in told.values()] == [
+        ("dog-pace  a", False),
+        ("dog-pace  a", False),
+        ("dog-pace → mpc-trot  a", True),
+        ("dog-pace → mpc-trot  a", True),
+        ("mpc-trot  a", False),
+        ("mpc-trot  a", False),
+    ]
+    assert told[3.02].lines == ("3.02 s  0.50 m/s",)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from pydrake.geometry import Meshcat, MeshcatAnimation
+from pydrake.geometry import Meshcat
 
 from loco_drake import __version__
 from loco_drake.common.errors import check_choice
@@ -25,21 +25,19 @@ from loco_drake.evaluation.report.tables import figure_cell, robot_title
 from loco_drake.evaluation.tracking import (
     FRAMES_PER_SECOND,
     Recorder,
-    dress,
-    frame,
     tracking_metrics,
 )
 from loco_drake.generation.generate import generate_motion
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS, get_robot
+from loco_drake.models.scenery import dress, publish_replay
 from loco_drake.models.shipped import policy_path
 from loco_drake.motion.gaits import parse_label
 from loco_drake.motion.motion import Motion
 from loco_drake.systems.scenario import GeneratedReference, Scenario, TrainedPolicy
 
 STRIP_SECONDS = 1.0  # of motion for an outline; a little more than is shown
-_AGAIN = 10_000  # times that a replay is repeated
 _PIECE = 2000  # characters
 
 
@@ -187,18 +185,13 @@ def record_replays(
     )
     meshcat = Meshcat()
     dress(meshcat)
-    recorder = Recorder(scenario, meshcat)
+    recorder = Recorder(scenario, meshcat, follow=True)
     for label in labels:
         meshcat.DeleteRecording()
         recorder.start(gait=label, seed=seed)
         meshcat.StartRecording(frames_per_second=FRAMES_PER_SECOND)
         rollout, _ = recorder.run(seconds)
-        meshcat.StopRecording()
-        animation = meshcat.get_mutable_recording()
-        animation.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
-        animation.set_repetitions(_AGAIN)
-        meshcat.PublishRecording()
-        frame(meshcat, rollout.state[:, 4:7])
+        publish_replay(meshcat)
         figures = tracking_metrics(rollout)
         yield Replay(robot, label, meshcat.StaticHtml(), rollout.fell, figures)
 
