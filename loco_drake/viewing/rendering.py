@@ -2,6 +2,8 @@
 
 import ctypes
 import sys
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -73,6 +75,7 @@ def can_render() -> bool:
     """
     if sys.platform != "linux":
         return True
+    _load_triton()
     try:
         egl = ctypes.CDLL("libEGL.so.1")
     except OSError:
@@ -88,6 +91,15 @@ def can_render() -> bool:
         address
     )
     return bool(query(0, None, ctypes.byref(count))) and count.value > 0
+
+
+def _load_triton() -> None:
+    """Loads PyTorch's Triton, if there is one, before Mesa.
+
+    Both bring an LLVM, and Triton crashes the process if Mesa's is there first.
+    """
+    if find_spec("triton") is not None:
+        import_module("triton")
 
 
 def AddRenderEngine(plant: MultibodyPlant, scene_graph: SceneGraph) -> None:

@@ -1,4 +1,6 @@
+from importlib.util import find_spec
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from loco_drake.viewing import rendering
 from loco_drake.viewing.rendering import HEIGHT, WIDTH, make_engine
 from loco_drake.viewing.replay import pictures
 from loco_drake.viewing.takes import Scene, Take, take_of_motion
+from tests.process import run_python
 from tests.synthetic_motion import synthetic_motion
 from tests.viewing.pictures import needs_renderer, plan_pixels, robot_columns
 
@@ -54,3 +57,19 @@ def test_a_machine_that_cannot_render_is_told_what_it_lacks(monkeypatch):
     monkeypatch.setattr(rendering.ctypes, "CDLL", missing)
     with pytest.raises(OSError, match="apt-get install libegl1"):
         make_engine()
+
+
+@needs_renderer
+@pytest.mark.skipif(find_spec("triton") is None, reason="PyTorch is without Triton")
+def test_networks_are_loaded_after_pictures_are_made():
+    """Mesa's LLVM and Triton's crash a process that loads them in this order."""
+    script = """
+from tests.synthetic_motion import synthetic_motion
+from loco_drake.models.robots import get_robot
+from loco_drake.viewing.replay import pictures
+from loco_drake.viewing.takes import Scene, take_of_motion
+take = take_of_motion("a", synthetic_motion(seconds=0.2), get_robot("go2"))
+assert list(pictures([Scene((take,))], 1))
+import vector_quantize_pytorch
+"""
+    run_python("-c", script, cwd=Path(__file__).parents[2])
