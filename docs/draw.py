@@ -1,17 +1,21 @@
-"""Draws pictures of the documentation, with the shipped weights.
+r"""Draws pictures of the documentation, with the shipped weights.
 
-From the root of the repository; `library` after ``loco-drake retarget``. The first two
-need Chromium on the path (``chromium``, headless), `retargeting` the recordings, too:
+From the root of the repository. The first two need Chromium on the path (``chromium``,
+headless), `retargeting` the recordings, too:
 
     python docs/draw.py robot docs/images/go2_trot.png
     python docs/draw.py retargeting docs/images/retargeting.png --html replay.html
     python docs/draw.py gait-change docs/images/gait_change.png
-    python docs/draw.py library docs/images/library.png
+    python docs/draw.py paper
     python docs/draw.py steering
     python docs/draw.py gait-choice docs/images/gait_choice.png
     python docs/draw.py robustness docs/images/robustness.png
 
-``loco-drake evaluate ... --figures`` draws the others.
+``loco-drake evaluate ... --figures`` draws the others, among them Figure 1 of the
+paper, models/pretrained/results/retargeted-dog-pace.webp. The README's moving picture:
+
+    loco-drake simulate --no-meshcat --gait dog-pace,dog-trot@1.8 \
+        --duration 3.8 --seed 1 --video docs/images/go2.webp
 """
 
 import subprocess
@@ -30,13 +34,20 @@ from loco_drake.cli.output import write_figure
 from loco_drake.common.files import atomic_path, read_json
 from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments, select_labels
-from loco_drake.evaluation.dataset_picture import describe, library_figure
+from loco_drake.evaluation.dataset_picture import library_figure
 from loco_drake.evaluation.gait_change import change_figure
 from loco_drake.evaluation.gait_choice_picture import choice_figure
+from loco_drake.evaluation.library import read_library
 from loco_drake.evaluation.report.results import load_results, results_dir
 from loco_drake.evaluation.robustness_pictures import curves_figure
 from loco_drake.evaluation.steering_pictures import grid_figure, steering_figures
 from loco_drake.evaluation.tracking import Recorder
+from loco_drake.evaluation.tracking_pictures import (
+    learning_figure,
+    record_traces,
+    returns_figure,
+    traces_figure,
+)
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.ground import AddGround
@@ -44,9 +55,8 @@ from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS, AddRobotModel, get_robot
 from loco_drake.models.scenery import dress
 from loco_drake.models.shipped import results_path
-from loco_drake.motion.gaits import LABELS, parse_schedule
+from loco_drake.motion.gaits import parse_schedule
 from loco_drake.motion.motion import FPS
-from loco_drake.motion.motion_file import load_motion
 from loco_drake.retargeting.retarget import retarget_clip
 from loco_drake.retargeting.scaling import resample
 from loco_drake.systems.gait_selector import measured_gaits
@@ -194,12 +204,23 @@ def gait_change(
     write_figure(change_figure(model.robot, motion, schedule), png, dpi=80)
 
 
-def library(png: Png, motions: Path = Path("motions/go2")) -> None:
-    """How much motion there is in a folder of Motion files, and how it differs."""
-    loaded = map(load_motion, sorted(motions.glob("*.npz")))
-    points = [describe(motion) for motion in loaded if motion.label in LABELS]
-    title = f"{len(points)} stretches of motion, {sum(p.seconds for p in points):.0f} s"
-    write_figure(library_figure(points, title), png, dpi=80)
+def paper(folder: Path = Path("docs/images"), seed: int = 0) -> None:
+    """Figures 2 and 3 of the paper, as ``loco-drake report`` draws them.
+
+    Args:
+        folder: of the pictures.
+        seed: of the motion that is tracked.
+    """
+    results = load_results(results_dir())
+    library = read_library(results.of_robots("retargeting")["go2"])
+    pictures = {
+        "figure_2": library_figure(library),
+        "figure_3_returns": returns_figure(results.of_robots("tracking-generated")),
+        "figure_3_motion": traces_figure(record_traces(ROBOTS, seed)),
+        "figure_3_learning": learning_figure(results.of_robots("learning"))[0],
+    }
+    for name, picture in pictures.items():
+        write_figure(picture, folder / f"{name}.png", dpi=80)
 
 
 def steering(
@@ -265,7 +286,7 @@ if __name__ == "__main__":
         "robot": robot,
         "retargeting": retargeting,
         "gait-change": gait_change,
-        "library": library,
+        "paper": paper,
         "steering": steering,
         "gait-choice": gait_choice,
         "robustness": robustness,

@@ -12,14 +12,22 @@ from pathlib import Path
 from typing import Any
 
 from loco_drake.common.files import atomic_path, read_json
-from loco_drake.evaluation.report.results import Figures, results_dir
+from loco_drake.evaluation.report.goals import MISSED, UNKNOWN, scoreboard
+from loco_drake.evaluation.report.results import (
+    Figures,
+    Results,
+    load_results,
+    results_dir,
+)
 from loco_drake.evaluation.report.sections import disturbed_table
+from loco_drake.evaluation.report.tables import figure_cell, recognition_tables
 from loco_drake.evaluation.robustness_pictures import levels_table
 from loco_drake.models.robots import ROBOTS
 
 DOCS = Path(__file__).parent
 TITLES = {"go2": "Go2", "a1": "A1"}
 MISSING = "–"
+MARKS = ("✓", "✗")  # a goal is met, missed
 
 Rows = list[list[str]]
 # Key of the figure, factor, digits.
@@ -76,6 +84,27 @@ def level_rows(results: dict[str, Any]) -> Rows:
     return [list(row) for row in levels_table(results["all"])[1]]
 
 
+def table_1_rows(results: Results) -> Rows:
+    """Returns the rows of Table 1 of docs/results.md."""
+    table = recognition_tables(results.of_robots("generation"))["transformer"]
+    return [[row.title, *(cell.text for cell in row.cells)] for row in table.rows]
+
+
+def goal_rows(results: Results) -> Rows:
+    """Returns the rows of the goals of docs/results.md."""
+    rows = []
+    for part, lines in scoreboard(results).items():
+        for number, line in enumerate(lines):
+            goal, cells = line.goal, []
+            for found, verdict in zip(line.measured, line.verdicts, strict=True):
+                text = figure_cell(found, goal.digits).text
+                mark = MARKS[verdict == MISSED]
+                cells.append("not measured" if verdict == UNKNOWN else f"{text} {mark}")
+            title = goal.title if number else f"**{part}:** {goal.title}"
+            rows.append([title, goal.unit, goal.known, str(goal.aim), *cells])
+    return rows
+
+
 # Page, results, the line before the table, and its rows.
 _TABLES: tuple[tuple[str, str, str, Callable[[dict[str, Any]], Rows]], ...] = (
     ("tracking.md", "tracking-{robot}-generated", "{title}:", tracking_rows),
@@ -87,6 +116,11 @@ _TABLES: tuple[tuple[str, str, str, Callable[[dict[str, Any]], Rows]], ...] = (
         disturbed_rows,
     ),
     ("robustness.md", "robustness-{robot}", "{title}, all [^\n]+:", level_rows),
+)
+# The same of tables of all results.
+_WHOLE: tuple[tuple[str, str, Callable[[Results], Rows]], ...] = (
+    ("results.md", "share of trajectories recognized:", table_1_rows),
+    ("results.md", "Goals and what was measured[^\n]*:", goal_rows),
 )
 
 
@@ -101,6 +135,9 @@ def with_results(name: str, page: str) -> str:
             found = read_json(results_dir() / f"{results.format(robot=robot)}.json")
             line = before.format(title=TITLES[robot])
             page = _replaced(page, line, rows(found))
+    for file, line, whole in _WHOLE:
+        if file == name:
+            page = _replaced(page, line, whole(load_results(results_dir())))
     return page
 
 
@@ -130,7 +167,7 @@ def _cells(figures: dict[str, Any], columns: Columns) -> list[str]:
 
 
 if __name__ == "__main__":
-    for name in sorted({table[0] for table in _TABLES}):
+    for name in sorted({table[0] for table in (*_TABLES, *_WHOLE)}):
         path = DOCS / name
         page = with_results(name, path.read_text())
         with atomic_path(path) as temporary:

@@ -6,7 +6,9 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 
+from loco_drake import __version__
 from loco_drake.cli.main import _COMMANDS
 from loco_drake.evaluation.report.results import results_dir
 from loco_drake.systems.diagram import MakeLocomotionDiagram
@@ -88,7 +90,9 @@ def readme():
     return (ROOT / "README.md").read_text()
 
 
-@pytest.mark.parametrize("name", ["tracking.md", "steering.md", "robustness.md"])
+@pytest.mark.parametrize(
+    "name", ["tracking.md", "steering.md", "robustness.md", "results.md"]
+)
 def test_pages_show_the_committed_results(name):
     page = (ROOT / "docs" / name).read_text()
     assert tables().with_results(name, page) == page
@@ -114,3 +118,20 @@ def tables():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def test_citation_says_what_the_package_is():
+    """What version 1.2.0 of the format requires, and nothing that is not known."""
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert cited["cff-version"] == "1.2.0"
+    assert cited["message"]
+    assert (cited["title"], str(cited["version"])) == ("loco_drake", __version__)
+    assert cited["license"] == "BSD-3-Clause"
+    for work in (cited, *cited["references"]):
+        assert work["title"]
+        assert all(set(author) == {"name"} for author in work["authors"])
+    (paper,) = cited["references"]
+    assert paper["type"] == "generic"
+    entries = re.findall(r"^```bibtex\n(.*?)^```$", readme(), re.M | re.S)
+    for text in (paper["title"], __version__, cited["authors"][0]["name"]):
+        assert f"{{{text}}}" in entries[0]

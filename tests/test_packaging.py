@@ -73,6 +73,7 @@ def test_wheel_has_code_models_weights_and_configuration(wheel):
         "models/pretrained/generator.safetensors",
         "models/pretrained/policy_go2.safetensors",
         "models/pretrained/results/generation.json",
+        "models/pretrained/results/retargeted-dog-pace.webp",
         "models/pretrained/results/tracking-go2-generated.json",
         "evaluation/report/templates/page.html",
         "evaluation/report/templates/style.css",

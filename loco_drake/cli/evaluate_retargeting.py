@@ -2,12 +2,25 @@
 
 import time
 from dataclasses import asdict, dataclass
-from typing import Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 from loco_drake.cli.evaluation import Evaluation, print_by_label
-from loco_drake.cli.options import option, some_labels
-from loco_drake.cli.output import MARK, print_failed, print_warnings, tracked
-from loco_drake.common.errors import check_choice
+from loco_drake.cli.options import Figures, option, some_labels
+from loco_drake.cli.output import (
+    MARK,
+    print_failed,
+    print_warnings,
+    say,
+    tracked,
+    write_figure,
+)
+from loco_drake.common.errors import InputError, check_choice
+
+if TYPE_CHECKING:
+    from loco_drake.datasets.segments import Segment
+    from loco_drake.models.quadruped import Quadruped
+    from loco_drake.retargeting.scaling import Variant
 
 
 @dataclass(kw_only=True)
@@ -30,6 +43,17 @@ class EvaluateRetargeting(Evaluation):
     ground: bool = False
     # Exit with status 1 if a figure of a clip is outside its bounds.
     strict: bool = False
+    # Folder for pictures: of each label the robots with the recording's keypoints, and
+    # of each robot the library of its motion.
+    figures: Figures = None
+
+    def check(self) -> None:
+        """Raises InputError if an option is wrong, OSError if it cannot draw."""
+        super().check()
+        if self.figures is not None:
+            from loco_drake.viewing.rendering import make_engine
+
+            make_engine()
 
     def robots(self) -> list[str]:
         """Returns the names of the robots, or a robot's file."""
@@ -37,17 +61,29 @@ class EvaluateRetargeting(Evaluation):
 
         return [self.robot] if is_robot_file(self.robot) else super().robots()
 
-    def of_robots(self, names: list[str]) -> dict[str, Any]:
-        """Returns the figures of all robots by name."""
+    @property
+    def _variant(self) -> "Variant":
+        from loco_drake.retargeting.scaling import Variant
+
+        return Variant(mirror=self.mirror, froude=self.froude, ground=self.ground)
+
+    def _segments(self) -> "tuple[list[Segment], list[Segment]]":
+        """Returns all segments of the data folder, and those of the labels."""
         from loco_drake.datasets.registry import data_dir
         from loco_drake.datasets.segments import read_segments, select_labels
+
+        every = read_segments(data_dir(self.data_dir))
+        return every, select_labels(every, self.labels)
+
+    def of_robots(self, names: list[str]) -> dict[str, Any]:
+        """Returns the figures of all robots by name."""
+        from loco_drake.datasets.split import Split
         from loco_drake.evaluation.retargeting import score_segments, summarize
         from loco_drake.models.robot_files import load_robot
         from loco_drake.models.robots import ROBOTS
-        from loco_drake.retargeting.scaling import Variant
 
-        segments = select_labels(read_segments(data_dir(self.data_dir)), self.labels)
-        variant = Variant(mirror=self.mirror, froude=self.froude, ground=self.ground)
+        every, segments = self._segments()
+        split, variant = Split(every), self._variant
         robots = {}
         loaded = [load_robot(name) for name in names]
         if self.ground:
@@ -55,12 +91,48 @@ class EvaluateRetargeting(Evaluation):
                 check_choice("robot to ground", robot.name, ROBOTS)
         for robot in loaded:
             start = time.perf_counter()
-            scores = score_segments(segments, robot, self.workers, variant)
+            scores = score_segments(segments, robot, self.workers, variant, split)
             what = f"Retargeting to {robot.name}"
             figures = summarize(list(tracked(scores, what, len(segments))))
             figures["wall_clock_s"] = time.perf_counter() - start
             robots[robot.name] = figures
         return {"robots": robots, **asdict(variant)}
+
+    def draw(self, name: str, figures: dict[str, Any]) -> None:
+        """Writes a picture of a robot's library; with the last robot those of all."""
+        from loco_drake.evaluation.dataset_picture import library_figure
+        from loco_drake.evaluation.library import read_library
+        from loco_drake.evaluation.report.results import Figures
+        from loco_drake.models.robot_files import load_robot
+
+        if self.figures is None:
+            return
+        if figures["library"] is not None:
+            library = read_library(Figures(figures))
+            write_figure(library_figure(library), self.figures / f"{name}-library.png")
+        robots = [load_robot(definition) for definition in self.robots()]
+        if name == robots[-1].name:
+            self._draw_poses(self.figures, robots)
+
+    def _draw_poses(self, folder: Path, robots: "list[Quadruped]") -> None:
+        """Writes the robots' poses: of each label the first stretch that all can do."""
+        from loco_drake.evaluation.report.tables import robot_title
+        from loco_drake.viewing.poses import poses_figure
+
+        rows = robots[::-1]  # the A1 above the Go2, as in the paper
+        names = [robot_title(robot.name) for robot in rows]
+        _, segments = self._segments()
+        drawn: set[str] = set()
+        for segment in tracked(segments, "Drawing", len(segments)):
+            if segment.label in drawn:
+                continue
+            try:
+                figure = poses_figure(segment, rows, names, self._variant)
+            except InputError as error:
+                say(f"{segment.name} is not drawn: {error}")
+                continue
+            write_figure(figure, folder / f"retargeted-{segment.label}.webp", dpi=100)
+            drawn.add(segment.label)
 
     def show(self, name: str, figures: dict[str, Any]) -> int:
         """Prints a table of all labels, and which clips failed or are doubtful.

@@ -34,7 +34,7 @@ class Report:
         tuple[str, ...],
         option(
             f"Gait labels: any of {LABEL_CHOICES}; of the replays on the page, of each "
-            "robot that has a policy. none for no replays.",
+            "robot that has a policy. none for no simulations.",
             name="labels",
             metavar="LABEL ...",
         ),

@@ -18,6 +18,8 @@ label's figures are made of its clips':
   reading excluded
 * figures of grounding: root of the mean square over all frames of all clips that have
   the figure; only if motion is grounded
+
+Beside them is what the motion is, see :mod:`loco_drake.evaluation.library`.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -31,10 +33,18 @@ import numpy as np
 from loco_drake.common.arrays import Array
 from loco_drake.common.parallel import map_in_workers
 from loco_drake.datasets.segments import Segment
+from loco_drake.datasets.split import Split
+from loco_drake.evaluation.library import (
+    MotionPoint,
+    describe,
+    library_results,
+    make_library,
+)
 from loco_drake.evaluation.motion_scores import median
 from loco_drake.evaluation.samples import labels_of
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.models.robot_files import load_robot
+from loco_drake.models.robots import ROBOTS
 from loco_drake.motion.gait_timing import (
     GaitTiming,
     Track,
@@ -103,6 +113,7 @@ class ClipScore:
     report: RetargetReport  # what retargeting says
     slip_speeds: Array  # of each step of each toe in stance, m/s, shape (N,)
     fidelity: GaitFidelity | None  # None if there are fewer than three strides
+    point: MotionPoint | None = None  # None of a robot that is not of ROBOTS
 
 
 @dataclass(frozen=True)
@@ -116,8 +127,8 @@ class FailedClip:
 class _Scorer:
     """Retargets and scores, see :func:`score_segments`."""
 
-    def __init__(self, robot: str, variant: Variant) -> None:
-        self._retarget = SegmentRetargeter(load_robot(robot), variant=variant)
+    def __init__(self, robot: str, split: Split | None, variant: Variant) -> None:
+        self._retarget = SegmentRetargeter(load_robot(robot), split, variant)
 
     def __call__(self, segment: Segment) -> ClipScore | FailedClip:
         result = self._retarget(segment)
@@ -132,6 +143,7 @@ class _Scorer:
             report=report,
             slip_speeds=stance_slip_speeds(p_WF, robot.foot_radius, motion.fps),
             fidelity=gait_fidelity(track, motion_track(motion, robot)),
+            point=describe(motion) if robot.name in ROBOTS else None,
         )
 
 
@@ -140,13 +152,15 @@ def score_segments(
     robot: Quadruped,
     workers: int = 1,
     variant: Variant = AS_RECORDED,
+    split: Split | None = None,
 ) -> Iterator[ClipScore | FailedClip]:
     """Retargets segments, and yields the figures of each, in their order.
 
-    A process has only one clip at a time in memory. The rhythm of a variant is compared
-    with that of the recording in the motion's time.
+    Without a ``split`` all are for training. A process has only one clip at a time in
+    memory. The rhythm of a variant is compared with that of the recording in the
+    motion's time.
     """
-    make = partial(_Scorer, robot.definition, variant)
+    make = partial(_Scorer, robot.definition, split, variant)
     return map_in_workers(make, segments, workers)
 
 
@@ -154,8 +168,8 @@ def summarize(scores: Sequence[ClipScore | FailedClip]) -> dict[str, Any]:
     """Returns what ``loco-drake evaluate retargeting`` writes for a robot.
 
     "labels", "all", "frames_per_second", "failed", and "other" for labels that are not
-    among the fifteen, which "all" leaves out; "warnings" has sentences by clip, see
-    :mod:`loco_drake.retargeting.bounds`.
+    among the fifteen, which "all" and "library" leave out; "warnings" has sentences by
+    clip, see :mod:`loco_drake.retargeting.bounds`. The library is null if it is empty.
     """
     by_label: dict[str, list[ClipScore]] = {}
     for score in scores:
@@ -168,10 +182,12 @@ def summarize(scores: Sequence[ClipScore | FailedClip]) -> dict[str, Any]:
     known = [clip for clip in done if clip.segment.label in names]
     frames = sum(clip.report.frames for clip in done)
     seconds = sum(clip.report.frames / clip.report.frames_per_second for clip in done)
+    points = [clip.point for clip in known if clip.point is not None]
     return {
         "labels": {name: figures(by_label[name]) for name in names},
         "all": figures(known),
         "frames_per_second": frames / seconds if done else None,
+        "library": library_results(make_library(points)) if points else None,
         "warnings": {
             clip.segment.name: warnings
             for clip in done

@@ -235,9 +235,15 @@ def stretch(rollout: Rollout) -> float:
 
 def speed(rollout: Rollout) -> float:
     """Mean over samples of the base's velocity along its own heading, m/s."""
-    q, v = split(rollout.state)
+    return float(np.mean(forward_speeds(rollout.state)))
+
+
+def forward_speeds(state: Array) -> Array:
+    """Returns the base's velocity along its heading, m/s, (N,), of [q, v], (N, 37)."""
+    q, v = split(state)
     yaw, v = yaw_of(q[ORIENTATION]), v[VELOCITY]
-    return float(np.mean(v[:, 0] * np.cos(yaw) + v[:, 1] * np.sin(yaw)))
+    forward: Array = v[:, 0] * np.cos(yaw) + v[:, 1] * np.sin(yaw)
+    return forward
 
 
 def slip_speeds(rollout: Rollout, robot: Robot) -> Array:

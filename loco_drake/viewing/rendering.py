@@ -31,7 +31,7 @@ from pydrake.systems.sensors import CameraInfo
 
 from loco_drake.common.arrays import Array
 
-Picture = NDArray[np.uint8]  # red, green, blue, shape (HEIGHT, WIDTH, 3)
+Picture = NDArray[np.uint8]  # red, green, blue, shape (height, width, 3)
 
 WIDTH, HEIGHT = 640, 360  # pixels
 _NAME = "vtk"
@@ -112,19 +112,45 @@ def AddRenderEngine(plant: MultibodyPlant, scene_graph: SceneGraph) -> None:
 
 
 class Camera:
-    """A camera at ``eye`` that looks at ``target``, both (3,) in m."""
+    """A camera at ``eye`` that looks at ``target``, both (3,) in m.
 
-    def __init__(self, eye: Array, target: Array) -> None:
-        intrinsics = CameraInfo(WIDTH, HEIGHT, FIELD_OF_VIEW)
+    Args:
+        eye: where it is.
+        target: what is in the middle of its pictures.
+        size: of the pictures, width and height in pixels.
+        field_of_view: from top to bottom, rad.
+    """
+
+    def __init__(
+        self,
+        eye: Array,
+        target: Array,
+        size: tuple[int, int] = (WIDTH, HEIGHT),
+        field_of_view: float = FIELD_OF_VIEW,
+    ) -> None:
+        intrinsics = CameraInfo(*size, field_of_view)
         core = RenderCameraCore(
             _NAME, intrinsics, ClippingRange(_NEAR, _FAR), RigidTransform()
         )
         self._camera = ColorRenderCamera(core, False)
+        self._matrix = intrinsics.intrinsic_matrix()
         forward = (target - eye) / np.linalg.norm(target - eye)
         right = np.cross(forward, [0.0, 0.0, 1.0])
         right /= np.linalg.norm(right)
         axes = np.stack((right, np.cross(forward, right), forward), axis=1)
         self._X_WC = RigidTransform(RotationMatrix(axes), eye)
+
+    def project(self, p_W: Array) -> tuple[Array, Array]:
+        """Returns where points (N, 3) in m are seen, and how large.
+
+        Returns:
+            Pixels from the left and from the top, (N, 2), and pixels per m, (N,).
+        """
+        p_C = self._X_WC.inverse().multiply(p_W.T).T
+        seen = p_C @ self._matrix.T
+        pixels: Array = seen[:, :2] / seen[:, 2:]
+        scale: Array = self._matrix[0, 0] / p_C[:, 2]
+        return pixels, scale
 
     def take(self, query: QueryObject) -> Picture:
         """Returns a picture of the scene graph."""

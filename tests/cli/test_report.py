@@ -132,7 +132,7 @@ def test_pictures_say_what_they_show(made):
     pictures = re.findall(r'<svg[^>]*role="img"[^>]*>', page)
     assert len(pictures) == len(re.findall("<svg", page)) == 6
     assert "at the end go2 dog 61, go2 solo8 93" in section(page, "figure-3")
-    strips = section(page, "figure-1")
+    strips = section(page, "gaits")
     assert strips.count("solo8-wave") >= 1
     assert "Outlines of go2 and a1" in strips
 
@@ -146,6 +146,7 @@ def test_missing_results_are_named_with_their_commands(made):
     for name, command in missing.items():
         assert f"{name} : {command}" in text(listed)
     assert "tokenizer.json has nothing on the A1" in text(listed)
+    assert missing["retargeted-dog-pace.webp"] in text(section(page, "figure-1"))
     for name in ("table-1", "realism"):
         assert "Not measured yet. It takes loco-drake evaluate generation" in text(
             section(page, name)
@@ -170,7 +171,7 @@ def test_counts_are_those_of_the_page(made):
 
 def test_the_page_needs_nothing_else(made):
     page, figures = made
-    assert not re.findall(r'(?:src|href)="(?!#)', page)
+    assert not re.findall(r'(?:src|href)="(?!#|data:)', page)
     assert not re.findall(r"@import|url\((?!#)", page)
     assert figures["replays"] == []
     assert figures["bytes"] == len(page.encode())
@@ -220,6 +221,7 @@ def test_a_replay_can_be_put_together_from_the_page(shipped):
     assert replay.startswith("<!DOCTYPE html>")
     assert replay.rstrip().endswith("</html>")
     assert "MeshCat.Viewer" in replay
+    assert "of dog-pace, beside those of the plan" in section(page, "figure-3")
     button = re.search(r"<button[^>]*data-replay=\"0\".*?</button>", page, re.DOTALL)
     assert re.search(r"Go2, dog-trot return \d+ of 100, 1\.\d\d m/s$", text(button[0]))
 

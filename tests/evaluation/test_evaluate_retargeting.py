@@ -101,6 +101,7 @@ def test_other_labels_and_failures_are_told_apart():
     assert got["all"]["clips"] == 1
     assert got["all"]["toe_error_rmse_m"] == pytest.approx(0.001)
     assert got["frames_per_second"] == pytest.approx(500 / 1.5)
+    assert got["library"] is None
     assert got["failed"] == {"dog-pace-d-0-9": "It is cut."}
     assert got["labels"]["dog-pace"]["reason"] == "no clip could be retargeted"
 
@@ -114,5 +115,7 @@ def test_made_dogs_are_scored_alike_by_one_process_and_by_two(made_data):
     for a, b in zip(alone, shared, strict=True):
         np.testing.assert_array_equal(a.slip_speeds, b.slip_speeds)
         assert a.fidelity == b.fidelity
+        assert a.point.label == b.point.label
+        np.testing.assert_array_equal(a.point.summaries, b.point.summaries)
         assert a.fidelity.stride_period_error < 0.01
         assert a.fidelity.phase_lag_error < 0.02

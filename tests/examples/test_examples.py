@@ -9,6 +9,8 @@ from loco_drake.cli.main import main
 from loco_drake.control.actor import load_actor
 from loco_drake.evaluation.tracking import joint_rmse
 from loco_drake.models.robots import get_robot
+from loco_drake.motion.motion_file import load_motion
+from loco_drake.motion.quality import toe_trajectories
 from loco_drake.systems.scenario import GeneratedReference, Scenario
 from tests.process import run_python
 from tests.synthetic import write_dog_recording
@@ -79,6 +81,15 @@ def test_retarget_saves_a_replay_of_the_recording(tmp_path):
     page = (tmp_path / "replay.html").read_text()
     assert "<html" in page
     assert 1e6 < len(page) < 10e6
+
+
+def test_own_motion_bows_over_feet_that_stand(tmp_path):
+    run(tmp_path, "own_motion.py", "--out", "bow.npz", "--depth", "0.05")
+    motion = load_motion(tmp_path / "bow.npz")
+    assert (str(motion.label), len(motion)) == ("own-bow", 200)
+    assert np.ptp(motion.base_position[:, 2]) == pytest.approx(0.05, abs=1e-3)
+    toes = toe_trajectories(motion, get_robot("go2"))
+    assert np.ptp(toes, axis=0).max() < 1e-4
 
 
 @pytest.mark.slow

@@ -5,21 +5,29 @@ viewer and meshes of several MB, and a recording of a few hundred kB. Replays of
 differ in the recording only, so common parts are stored once.
 """
 
+import base64
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from PIL import Image
 from pydrake.geometry import Meshcat
 
 from loco_drake import __version__
-from loco_drake.common.errors import check_choice
+from loco_drake.common.errors import InputError, check_choice
 from loco_drake.control.actor import load_actor
+from loco_drake.evaluation.library import read_library
 from loco_drake.evaluation.report import pictures
 from loco_drake.evaluation.report.content import CONTENT
 from loco_drake.evaluation.report.goals import counts, scoreboard
-from loco_drake.evaluation.report.results import Results, commands, load_results
+from loco_drake.evaluation.report.results import (
+    RETARGETED,
+    Results,
+    commands,
+    load_results,
+)
 from loco_drake.evaluation.report.sections import all_tables, networks_table
 from loco_drake.evaluation.report.tables import figure_cell, robot_title
 from loco_drake.evaluation.tracking import (
@@ -27,6 +35,7 @@ from loco_drake.evaluation.tracking import (
     Recorder,
     tracking_metrics,
 )
+from loco_drake.evaluation.tracking_pictures import record_traces
 from loco_drake.generation.generate import generate_motion
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.plant import PlantConfig
@@ -63,7 +72,7 @@ def build_report(
 
     Args:
         folder: folder of results, see :func:`.results.load_results`.
-        labels: labels of the replays for each robot; may be empty.
+        labels: labels of the replays for each robot; without any nothing is simulated.
         seconds: duration of each replay.
         seed: seed of the motion shown.
         say: receives messages about the progress.
@@ -81,12 +90,16 @@ def build_report(
             check_choice(f"gait of the {robot.name}'s policy", label, trained)
     say("Generating motion of each gait")
     motions = {name: _motions(name, seed) for name in ROBOTS}
+    traces = None
+    if labels:
+        say("Simulating the shipped policies")
+        traces = pictures.traces_picture(record_traces(ROBOTS, seed))
     replays: list[Replay] = []
     for name in ROBOTS if labels else ():
         for replay in record_replays(name, labels, seconds, seed):
             say(f"Simulated {name}, {replay.label}")
             replays.append(replay)
-    return _render(shown, motions, replays), {
+    return _render({**shown, "traces": traces}, motions, replays), {
         "goals": shown["counts"],
         "missing": {file.path: file.command for file in results.missing},
         "replays": [f"{replay.robot} {replay.label}" for replay in replays],
@@ -112,6 +125,11 @@ def of_results(results: Results) -> dict[str, Any]:
     }
     steering = results.of_robots("steering")
     disturbed = results.of_robots("robustness")
+    libraries = {
+        robot: read_library(figures)
+        for robot, figures in results.of_robots("retargeting").items()
+        if figures.values.get("library") is not None
+    }
     return {
         "goals": goals,
         "counts": counts(goals),
@@ -133,7 +151,31 @@ def of_results(results: Results) -> dict[str, Any]:
         "curves": pictures.curves_picture(disturbed) if disturbed else None,
         "returns": pictures.returns_picture(tracking) if tracking else None,
         "learning": pictures.learning_picture(learning) if learning else None,
+        "retargeted": _retargeted(results),
+        "retargeted_command": RETARGETED.command,
+        # The robots' differ little.
+        "library": next(
+            (pictures.library_picture(*own) for own in libraries.items()), None
+        ),
+        "library_of": next(iter(libraries.items()), None),
     }
+
+
+def _retargeted(results: Results) -> str | None:
+    """Returns the picture RETARGETED as the address of an element, if it is there.
+
+    Raises:
+        InputError: if it is no picture.
+    """
+    if RETARGETED in results.missing:
+        return None
+    path = results.folder / RETARGETED.path
+    try:
+        with Image.open(path) as image:
+            image.verify()
+    except (OSError, SyntaxError, ValueError):
+        raise InputError(f"{path} is no picture; draw it again.") from None
+    return f"data:image/webp;base64,{base64.b64encode(path.read_bytes()).decode()}"
 
 
 def _render(

@@ -32,12 +32,13 @@ class ResultFile:
     flags: str = ""  # the part of command that figures of tracking do not tell
     # A key that all figures of a robot have; null where there are none.
     holds: str = "labels"
+    suffix: str = ".json"
 
     @property
     def path(self) -> str:
         """Its name in the folder of results."""
         if len(self.robots) > 1:
-            return f"{self.name}.json"
+            return f"{self.name}{self.suffix}"
         kind, _, condition = self.name.partition("-")
         return "-".join(filter(None, (kind, *self.robots, condition))) + ".json"
 
@@ -72,6 +73,13 @@ def _expected() -> Iterator[ResultFile]:
 
 
 EXPECTED = tuple(_expected())
+# The robots in a gait, with the keypoints of the recording: a picture.
+RETARGETED = ResultFile(
+    "retargeted-dog-pace",
+    ROBOTS,
+    "loco-drake evaluate retargeting --robot all --labels dog-pace --figures FOLDER",
+    suffix=".webp",
+)
 
 
 @dataclass(frozen=True)
@@ -169,6 +177,18 @@ class Figures:
             raise self.damaged(f"{key} is no list of {size} numbers")
         return np.array(values, float)
 
+    def pairs(self, key: str) -> Array:
+        """Returns the list of pairs of numbers that is called ``key``, shape (N, 2)."""
+        try:
+            values = np.array(self.values.get(key), float)
+        except (TypeError, ValueError, OverflowError):
+            values = np.empty(())
+        if values.shape == (0,):
+            return np.empty((0, 2))
+        if values.ndim != 2 or values.shape[1] != 2 or not _bounded(values):
+            raise self.damaged(f"{key} is no list of pairs of numbers")
+        return values
+
     def flag(self, key: str) -> bool:
         """Returns whether ``key`` is true."""
         value = self.values.get(key)
@@ -207,13 +227,17 @@ class Figures:
         return InputError(f"{self.origin} is damaged: {shown}; write it again.")
 
 
+def _bounded(values: Array) -> bool:
+    return bool((np.abs(values) <= _GREATEST).all())  # NaN is not, either
+
+
 @dataclass(frozen=True)
 class Results:
     """All results in a folder."""
 
-    folder: Path  # where they are
+    folder: Path  # where they are; RETARGETED is there, too, or among the missing
     found: dict[str, dict[str, Figures]]  # by file, then by robot
-    missing: list[ResultFile]  # expected files that are not there
+    missing: list[ResultFile]  # files that are not there
     # File and robot of figures that a file does not have, and why.
     absent: dict[tuple[str, str], str]
 
@@ -248,7 +272,8 @@ def load_results(folder: Path) -> Results:
         raise InputError(
             f"There is no folder of results {str(folder)!r}; it is to hold {names}."
         )
-    missing = [file for file in EXPECTED if not (folder / file.path).is_file()]
+    every = (*EXPECTED, RETARGETED)
+    missing = [file for file in every if not (folder / file.path).is_file()]
     found: dict[str, dict[str, Figures]] = {}
     absent: dict[tuple[str, str], str] = {}
     for file in (file for file in EXPECTED if file not in missing):

@@ -16,6 +16,7 @@ from tests.report_results import learning, robustness, steering, tokenizer, trac
 SHIPPED = sorted(path.name for path in results_dir().glob("*.json"))
 # What the hash leaves out, in bytes: a number or a list of numbers, or the hash.
 TIMED = rf'"({"|".join(TIMES)})":\s*(\[[^]]*\]|"?[0-9a-f.+-]+"?)'.encode()
+PICTURES = ("confusion", "returns", "learning", "grid", "curves", "library")
 WRONG = ("a word", [], {}, 3, None, True, float("nan"), 1e300, 10**400, [[1.0]], "$x_{")
 
 
@@ -61,7 +62,7 @@ def quick_pictures(monkeypatch):
 @pytest.mark.parametrize("name", SHIPPED)
 def test_any_value_that_is_wrong(name, tmp_path, monkeypatch):
     """Of what tables and goals are made of: each of 12 values, by each wrong one."""
-    for picture in ("confusion", "returns", "learning", "grid", "curves"):
+    for picture in PICTURES:
         monkeypatch.setattr(pictures, f"{picture}_picture", lambda *_: "")
     content = json.loads((results_dir() / name).read_text())
     random = np.random.default_rng(0)
@@ -207,7 +208,7 @@ def test_labels_of_results_need_not_be_those_of_the_package(tmp_path):
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_flipped_digit_is_noticed(name, tmp_path, monkeypatch):
     """One digit of each of ten figures, but for times, becomes another."""
-    for picture in ("confusion", "returns", "learning", "grid", "curves"):
+    for picture in PICTURES:
         monkeypatch.setattr(pictures, f"{picture}_picture", lambda *_: "")
     written = (results_dir() / name).read_bytes()
     assert said_of(tmp_path, name, written) is None

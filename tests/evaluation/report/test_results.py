@@ -4,7 +4,7 @@ import pytest
 
 from loco_drake.common.errors import InputError
 from loco_drake.evaluation.report.goals import scoreboard
-from loco_drake.evaluation.report.results import EXPECTED, load_results
+from loco_drake.evaluation.report.results import EXPECTED, RETARGETED, load_results
 from tests.report_results import (
     learning,
     retargeting,
@@ -29,9 +29,8 @@ def test_files_of_one_robot_or_of_both_are_read(tmp_path):
     assert results.of("tracking-cenic", "go2") is None
     assert list(results.absent) == [("tokenizer.json", "go2")]
     there = {"tokenizer.json", "retargeting.json", "tracking-a1-cenic.json"}
-    assert {file.path for file in results.missing} == {
-        file.path for file in EXPECTED
-    } - there
+    every = {file.path for file in (*EXPECTED, RETARGETED)}
+    assert {file.path for file in results.missing} == every - there
 
 
 def test_a_robot_that_could_not_be_evaluated_is_absent_for_its_reason(tmp_path):
