@@ -1,6 +1,7 @@
 """Fixtures for all tests."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,25 @@ def real_data() -> Path:
         pytest.skip("needs real recordings: LOCO_DRAKE_DATA names no folder")
     assert Path(folder).is_dir(), f"LOCO_DRAKE_DATA: there is no folder {folder!r}"
     return Path(folder)
+
+
+@pytest.fixture(scope="session")
+def ray_cluster() -> Iterator[None]:
+    """A Ray cluster of two cores on this machine; without Ray the test is skipped.
+
+    Where RAY_ADDRESS names a cluster it is that one.
+    """
+    ray = pytest.importorskip("ray")
+    own = {} if "RAY_ADDRESS" in os.environ else {"num_cpus": 2}
+    os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+    ray.init(
+        os.environ.get("RAY_ADDRESS", "local"),
+        log_to_driver=False,
+        logging_level="ERROR",
+        **own,
+    )
+    yield
+    ray.shutdown()
 
 
 @pytest.fixture(scope="session")

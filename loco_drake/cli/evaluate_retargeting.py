@@ -91,7 +91,7 @@ class EvaluateRetargeting(Evaluation):
                 check_choice("robot to ground", robot.name, ROBOTS)
         for robot in loaded:
             start = time.perf_counter()
-            scores = score_segments(segments, robot, self.workers, variant, split)
+            scores = score_segments(segments, robot, self.executor, variant, split)
             what = f"Retargeting to {robot.name}"
             figures = summarize(list(tracked(scores, what, len(segments))))
             figures["wall_clock_s"] = time.perf_counter() - start

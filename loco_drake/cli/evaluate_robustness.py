@@ -71,7 +71,7 @@ class EvaluateRobustness(SimulatedEvaluation):
         from loco_drake.evaluation.disturbances import DURATION
         from loco_drake.evaluation.robustness_table import run_courses, summarize
 
-        outcomes = run_courses(scenario, courses, self.workers)
+        outcomes = run_courses(scenario, courses, self.executor)
         done = tracked(outcomes, f"Disturbing {name}", len(courses))
         return {
             "robot": name,

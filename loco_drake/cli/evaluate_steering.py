@@ -116,7 +116,7 @@ class EvaluateSteering(SimulatedEvaluation):
         from loco_drake.evaluation.steering_overall import overall
         from loco_drake.evaluation.steering_table import run_courses
 
-        results = run_courses(scenario, courses, self.workers)
+        results = run_courses(scenario, courses, self.executor)
         labels = dict(tracked(results, f"Driving {name}", len(courses)))
         return {"robot": name, "labels": labels, "all": overall(labels)}
 
@@ -151,7 +151,7 @@ class EvaluateSteering(SimulatedEvaluation):
         model.check_told()
         recorded = self.retarget(get_robot(name), model.grounded)
         stretches = by_label(cut((*recorded.train, *recorded.validation)))
-        ways = compare_ways(scenario, courses, self.workers)
+        ways = compare_ways(scenario, courses, self.executor)
         labels = {}
         for label, figures in tracked(ways, f"Driving {name}", len(courses)):
             found, natural = stretches.get(label), None

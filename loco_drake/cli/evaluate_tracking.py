@@ -153,7 +153,7 @@ class EvaluateTracking(SimulatedEvaluation):
 
         mujoco = self._mujoco() if self.simulator == "mujoco" else None
         episodes = run_trials(
-            scenario, trials, self.workers, self.randomization, mujoco
+            scenario, trials, self.executor, self.randomization, mujoco
         )
         return {
             "robot": name,

@@ -10,7 +10,7 @@ from loco_drake.cli.options import (
     DataDir,
     Json,
     UnusedSeed,
-    Workers,
+    WorkerOptions,
     option,
     some_labels,
 )
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class Evaluation:
+class Evaluation(WorkerOptions):
     """Base of the evaluations of Go2 and A1; KEYS are the keys of a robot's figures."""
 
     KEYS: ClassVar[tuple[str, ...]]
@@ -34,7 +34,6 @@ class Evaluation:
     robot: Annotated[str, option(metavar="ROBOT")] = "go2"
     labels: Annotated[tuple[str, ...], some_labels("all with recordings")] = ()
     data_dir: DataDir = None
-    workers: Workers = 1
     # Number of seeds, counted up from --seed: accepted by every evaluation; this one is
     # deterministic.
     seeds: int = 1
@@ -64,8 +63,9 @@ class Evaluation:
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""
-        for name, least in (("workers", 1), ("seeds", 1), ("seed", 0)):
+        for name, least in (("seeds", 1), ("seed", 0)):
             check_at_least(name, getattr(self, name), least)
+        _ = self.executor  # checks its options
 
     def robots(self) -> list[str]:
         """Returns the names of the robots; raises InputError if they are unknown."""
@@ -116,7 +116,7 @@ class Evaluation:
         grounding = " and grounding" if ground else ""
         say_of(robot.name)(f"Retargeting{grounding} the recordings")
         recorded = retarget_recordings(
-            folder, robot, self.labels, self.workers, ground=ground
+            folder, robot, self.labels, self.executor, ground=ground
         )
         print_failed(recorded.failed.items())
         return recorded

@@ -1,7 +1,7 @@
 """The command ``generate``."""
 
-import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -13,19 +13,18 @@ from loco_drake.cli.options import (
     Robot,
     Tokenizer,
     Weights,
+    WorkerOptions,
     option,
 )
-from loco_drake.cli.output import do_all, print_table, write_json
+from loco_drake.cli.output import do_all, print_table, tracked, write_json
 from loco_drake.common.errors import check_at_least, check_choice
 from loco_drake.motion.gaits import parse_schedule
 from loco_drake.motion.motion import FPS
-from loco_drake.motion.motion_file import save_motion
-
-BATCH = 32  # motions side by side
+from loco_drake.motion.motion_file import write_motion
 
 
 @dataclass(kw_only=True)
-class Generate:
+class Generate(WorkerOptions):
     """Generate motion of a gait and write Motion files at 50 frames/s."""
 
     gait: Annotated[str, option(f"{SCHEDULE}.", metavar="GAIT")] = "dog-trot"
@@ -64,13 +63,10 @@ class Generate:
 
     def run(self) -> int:
         """Writes the files and prints the figures; returns 0."""
-        from loco_drake.control.steered_motion import steered_motion
+        from loco_drake.control.motion_batches import BatchMaker, Order, batches
         from loco_drake.generation import generate
-        from loco_drake.generation.motion_model import motion_model_of
         from loco_drake.models.robots import ROBOTS
         from loco_drake.models.shipped import chosen_weights
-        from loco_drake.retargeting.grounding import ground
-        from loco_drake.retargeting.inverse_kinematics import LegSolver
 
         schedule = parse_schedule(self.gait)
         generate.check_duration(self.duration)
@@ -79,39 +75,39 @@ class Generate:
         if self.tell is not None:
             generate.check_velocity(self.tell)
         check_choice("robot", self.robot, ROBOTS)
+        executor = self.executor
         check_at_least("count", self.count, 1)
         check_at_least("seed", self.seed, 0)
         found = chosen_weights(
             self.weights, tokenizer=self.tokenizer, generator=self.generator
         )
-        model = motion_model_of(self.robot, found["tokenizer"], found["generator"])
-        solver = LegSolver(model.robot, FPS) if self.ground else None
-        seconds, frames = 0.0, 0
-        for first in range(self.seed, self.seed + self.count, BATCH):
-            seeds = range(first, min(first + BATCH, self.seed + self.count))
-            start = time.perf_counter()
-            motions = generate.generate_motions(
-                model,
-                schedule,
-                self.duration,
-                seeds,
-                temperature=self.temperature,
-                top_p=self.top_p,
-                speed_rank=self.pace,
-                velocity=self.tell,
-            )
-            seconds += time.perf_counter() - start
-            for seed, motion in zip(seeds, motions, strict=True):
-                if self.steer:
-                    motion = steered_motion(model.robot, motion, seed)
-                if self.ground:
-                    motion = ground(motion, model.robot, solver).motion
-                save_motion(motion, self.out / f"{schedule}-{seed}.npz")
-                frames += len(motion)
+        order = Order(
+            robot=self.robot,
+            tokenizer=found["tokenizer"],
+            generator=found["generator"],
+            schedule=schedule,
+            duration=self.duration,
+            temperature=self.temperature,
+            top_p=self.top_p,
+            speed_rank=self.pace,
+            velocity=self.tell,
+            steer=self.steer,
+            ground=self.ground,
+        )
+        seeds = batches(self.seed, self.count)
+        made = executor.map(partial(BatchMaker, order), seeds)
+        done = tracked(made, "Generating", len(seeds))
+        seconds, frames, tokens = 0.0, 0, 0.0
+        for own, batch in zip(seeds, done, strict=True):
+            for seed, content in zip(own, batch.files, strict=True):
+                write_motion(content, self.out / f"{schedule}-{seed}.npz")
+            seconds += batch.seconds
+            frames += batch.frames
+            tokens += batch.tokens
         figures = {
             "count": self.count,
             "frames_per_second": frames / seconds,
-            "tokens_per_second": frames / model.frames_per_token / seconds,
+            "tokens_per_second": tokens / seconds,
             "times_real_time": frames / FPS / seconds,
         }
         rows = [

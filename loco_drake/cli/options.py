@@ -5,14 +5,18 @@ with the same words, up to the first full stop, colon or semicolon. What follows
 is the command's own.
 """
 
+from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import tyro
 
 from loco_drake.models.shipped import shipped_policies
 from loco_drake.motion.gaits import GAITS, LABELS
+
+if TYPE_CHECKING:
+    from loco_drake.engine.executor import Executor
 
 
 class Output(Enum):
@@ -159,3 +163,46 @@ Fps = Annotated[
     ),
 ]
 SOURCES = "Source of recordings: dog, horse, mpc, solo8"
+Device = Annotated[
+    str,
+    option(
+        "Where the network learns: cpu, the reference, or cuda, a GPU of NVIDIA; "
+        "cuda:1 is the second. Results on a GPU differ in their last bits.",
+        metavar="NAME",
+    ),
+]
+
+
+@dataclass(kw_only=True)
+class EngineOptions:
+    """Where a command's workers run."""
+
+    # Where the workers run: local, on this machine, or ray, on a Ray cluster, which
+    # needs the extra 'ray'; see docs/machines.md.
+    engine: Annotated[str, option(metavar="NAME")] = "local"
+    # Address of the Ray cluster, such as auto or HOST:6379.
+    ray_address: Annotated[
+        str | None,
+        option(
+            metavar="TEXT",
+            default="$RAY_ADDRESS, else a cluster of its own on this machine",
+        ),
+    ] = None
+
+    def executor_of(self, workers: int) -> "Executor":
+        """Returns what runs the work; raises InputError if an option is wrong."""
+        from loco_drake.engine.choice import make_executor
+
+        return make_executor(self.engine, workers, self.ray_address)
+
+
+@dataclass(kw_only=True)
+class WorkerOptions(EngineOptions):
+    """How many workers a command has, and where they run."""
+
+    workers: Workers = 1
+
+    @property
+    def executor(self) -> "Executor":
+        """What runs the work; raises InputError if an option is wrong."""
+        return self.executor_of(self.workers)

@@ -17,7 +17,7 @@ from loco_drake.cli.options import (
     Json,
     Output,
     Start,
-    Workers,
+    WorkerOptions,
     option,
 )
 from loco_drake.cli.output import MARK, print_table
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class Retarget:
+class Retarget(WorkerOptions):
     """Retarget recordings to a robot and write Motion files at 50 frames/s.
 
     With FILE, retargets one stretch of that recording. Without, retargets every stretch
@@ -94,7 +94,6 @@ class Retarget:
     # sideways, faster, slower and backwards, see docs/driving.md. Stretches that are
     # held out for validation have none.
     steer: Annotated[int, option(name="steered")] = 0
-    workers: Workers = 1
     data_dir: DataDir = None
     # Exit with status 1 if a figure of a clip is outside its bounds.
     strict: bool = False
@@ -115,7 +114,7 @@ class Retarget:
 
         robot = load_robot(self.robot)
         check_at_least("trajectories", self.trajectories, 0)
-        check_at_least("workers", self.workers, 1)
+        executor = self.executor
         check_at_least("steered", self.steer, 0)
         if self.steer:
             check_choice("robot to steer", robot.name, ROBOTS)
@@ -126,7 +125,7 @@ class Retarget:
         variant = Variant(mirror=self.mirror, froude=self.froude, ground=self.ground)
         out = self.out or Path("motions") / f"{robot.name}{variant.suffix}"
         output.check_output(out, folder=True)
-        done = retarget_segments(segments, robot, out, split, self.workers, variant)
+        done = retarget_segments(segments, robot, out, split, executor, variant)
         outcomes: list[Outcome] = []
         statuses = []
         # A disk that is full by then keeps nothing from being told of what was done.

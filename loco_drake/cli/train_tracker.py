@@ -4,14 +4,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from loco_drake.cli.options import SHIPPED, Json, OutFolder, option
+from loco_drake.cli.options import (
+    SHIPPED,
+    Device,
+    EngineOptions,
+    Json,
+    OutFolder,
+    option,
+)
 from loco_drake.cli.training import train_policy
 from loco_drake.common.errors import check_at_least
 from loco_drake.tracking.config import TrainingConfig
 
 
 @dataclass(kw_only=True)
-class TrainTracker(TrainingConfig):
+class TrainTracker(TrainingConfig, EngineOptions):
     """Train the tracking policy on a folder of Motion files with PPO.
 
     Ctrl-C stops the training; --resume continues from the last update.
@@ -26,6 +33,7 @@ class TrainTracker(TrainingConfig):
     # Randomize the world of each episode: friction, masses, motors, latency, pushes and
     # sensor noise. Parts without a range of their own use the standard range.
     randomize: bool = False
+    device: Device = "cpu"
     start_from: Annotated[
         Path | None,
         option(
@@ -41,6 +49,7 @@ class TrainTracker(TrainingConfig):
 
     def run(self) -> int:
         """Trains, prints and writes; returns the exit status."""
+        from loco_drake.common.device import find_device
         from loco_drake.common.run_folder import check_folder, options_of
         from loco_drake.models.shipped import training_path
         from loco_drake.tracking.train import POLICY, train_tracker
@@ -50,6 +59,8 @@ class TrainTracker(TrainingConfig):
         if self.randomize:
             environment.randomization = environment.randomization.with_standard()
         self.check()
+        find_device(self.device)
+        executor = self.executor_of(self.workers)
         check_folder(self.out, POLICY, self.resume)
         start = self.start_from and training_path(self.start_from)
         return train_policy(
@@ -62,5 +73,7 @@ class TrainTracker(TrainingConfig):
                 first=start,
                 options=options_of(self),
                 report=report,
+                executor=executor,
+                device=self.device,
             ),
         )

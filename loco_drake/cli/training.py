@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from statistics import fmean
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from loco_drake.cli.options import Json
+from loco_drake.cli.options import Device, Json
 from loco_drake.cli.output import do_all, print_table, say, write_json, write_results
 from loco_drake.cli.parsing import parse
 from loco_drake.common.errors import InputError
@@ -47,13 +47,16 @@ class NetworkTraining(LoopSettings):
     """Base of the commands that train a network, which is called NAME."""
 
     NAME: ClassVar[str]
+    device: Device = "cpu"
     json: Json = None
 
     def run(self) -> int:
         """Trains, prints and writes; returns 1 if it was stopped early, else 0."""
+        from loco_drake.common.device import find_device
         from loco_drake.common.run_folder import check_folder
 
         self.check()
+        find_device(self.device)
         weights = self.out / f"{self.NAME}.safetensors"
         check_folder(self.out, weights.name, self.resume)
         result, score = self.learn()

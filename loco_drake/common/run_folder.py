@@ -234,10 +234,17 @@ def with_options(config: Config, options: Mapping[str, Any]) -> Config:
 def learning_tensors(
     module: nn.Module, optimizer: torch.optim.Optimizer
 ) -> dict[str, Tensor]:
-    """Returns networks, optimizer and torch's random state for a checkpoint."""
+    """Returns networks, optimizer and torch's random state for a checkpoint.
+
+    They are on the CPU, wherever the module is.
+    """
     tensors = {f"module/{name}": value for name, value in module.state_dict().items()}
     for index, moments in optimizer.state_dict()["state"].items():
         tensors |= {f"optimizer/{index}/{name}": x for name, x in moments.items()}
+    tensors = {name: value.cpu() for name, value in tensors.items()}
+    device = next(module.parameters()).device
+    if device.type == "cuda":
+        tensors["random/cuda"] = torch.cuda.get_rng_state(device)
     return {**tensors, "random/torch": torch.get_rng_state()}
 
 
@@ -267,6 +274,9 @@ def restore_learning(
         groups = optimizer.state_dict()["param_groups"]
         optimizer.load_state_dict({"state": moments, "param_groups": groups})
         torch.set_rng_state(saved.tensors["random/torch"])
+        device = next(module.parameters()).device
+        if device.type == "cuda" and "random/cuda" in saved.tensors:
+            torch.cuda.set_rng_state(saved.tensors["random/cuda"], device)
 
 
 def networks(saved: Checkpoint) -> dict[str, Tensor]:

@@ -71,7 +71,7 @@ class _Mirror:
     def __call__(self, values: Values) -> Values:
         """Returns the mirror image of ``values``, of the same shape (..., N)."""
         if isinstance(values, Tensor):
-            return values[..., self._order] * self._signs_torch
+            return values[..., self._order] * self._signs_torch.to(values.device)
         return (values[..., self._order] * self._signs).astype(values.dtype)
 
 

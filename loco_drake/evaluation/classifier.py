@@ -18,6 +18,7 @@ from torch.nn import functional
 
 from loco_drake.common.arrays import Array, Integers
 from loco_drake.common.determinism import single_thread
+from loco_drake.common.device import find_device
 from loco_drake.common.weights import load_network, save_network
 from loco_drake.evaluation.samples import CHANNELS, FRAMES, Samples, label_weights
 from loco_drake.generation.loop_settings import LoopSettings
@@ -135,9 +136,10 @@ def train_classifier(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
         classifier = GaitClassifier(config)
+    device = find_device(settings.device)
     channels = torch.tensor(samples.channels, dtype=torch.float32)
     classifier.set_statistics(channels.reshape(-1, CHANNELS))
-    targets = torch.tensor(classes)
+    channels, targets = channels.to(device), torch.tensor(classes).to(device)
     weights = label_weights(samples.labels)
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:

@@ -6,9 +6,10 @@ from functools import partial
 from pathlib import Path
 
 from loco_drake.common.errors import InputError
-from loco_drake.common.parallel import map_in_workers
 from loco_drake.datasets.segments import read_segments, select_labels
 from loco_drake.datasets.split import VALIDATION, Split
+from loco_drake.engine.executor import Executor
+from loco_drake.engine.local import LOCAL
 from loco_drake.evaluation.samples import by_label, cut, labels_of
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.motion.gaits import LABELS
@@ -41,7 +42,7 @@ def retarget_recordings(
     data_dir: Path,
     robot: Robot,
     labels: Iterable[str] = (),
-    workers: int = 1,
+    executor: Executor = LOCAL,
     *,
     ground: bool = False,
 ) -> Recorded:
@@ -58,9 +59,7 @@ def retarget_recordings(
     variant = Variant(ground=ground)
     make = partial(SegmentRetargeter, robot, Split(segments), variant)
     motions, failed = [], {}
-    for segment, made in zip(
-        wanted, map_in_workers(make, wanted, workers), strict=True
-    ):
+    for segment, made in zip(wanted, executor.map(make, wanted), strict=True):
         if isinstance(made, str):
             failed[segment.name] = made
         else:

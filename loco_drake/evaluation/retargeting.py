@@ -31,9 +31,10 @@ from typing import Any
 import numpy as np
 
 from loco_drake.common.arrays import Array
-from loco_drake.common.parallel import map_in_workers
 from loco_drake.datasets.segments import Segment
 from loco_drake.datasets.split import Split
+from loco_drake.engine.executor import Executor
+from loco_drake.engine.local import LOCAL
 from loco_drake.evaluation.library import (
     MotionPoint,
     describe,
@@ -150,7 +151,7 @@ class _Scorer:
 def score_segments(
     segments: Iterable[Segment],
     robot: Quadruped,
-    workers: int = 1,
+    executor: Executor = LOCAL,
     variant: Variant = AS_RECORDED,
     split: Split | None = None,
 ) -> Iterator[ClipScore | FailedClip]:
@@ -161,7 +162,7 @@ def score_segments(
     motion's time.
     """
     make = partial(_Scorer, robot.definition, split, variant)
-    return map_in_workers(make, segments, workers)
+    return executor.map(make, segments)
 
 
 def summarize(scores: Sequence[ClipScore | FailedClip]) -> dict[str, Any]:

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from loco_drake.common.parallel import map_in_workers
 from loco_drake.control.plan import PLAN_DT
+from loco_drake.engine.executor import Executor
+from loco_drake.engine.local import LOCAL
 from loco_drake.evaluation.disturbances import (
     DURATION,
     KINDS,
@@ -90,16 +91,16 @@ class _Runner:
 
 
 def run_courses(
-    scenario: Scenario, courses: Sequence[Course], workers: int = 1
+    scenario: Scenario, courses: Sequence[Course], executor: Executor = LOCAL
 ) -> Iterator[list[Outcome]]:
     """Yields the outcomes of each course, in order.
 
     Args:
         scenario: with a generated reference and a policy.
         courses: what to run.
-        workers: number of processes.
+        executor: runs them.
     """
-    return map_in_workers(partial(_Runner, scenario), courses, workers)
+    return executor.map(partial(_Runner, scenario), courses)
 
 
 def summarize(

@@ -25,10 +25,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from loco_drake.common.arrays import Array
-from loco_drake.common.parallel import map_in_workers
 from loco_drake.control.command import CommandRange
 from loco_drake.control.ground_path import ground_pose, path_velocity
 from loco_drake.control.plan import PLAN_DT, Plan
+from loco_drake.engine.executor import Executor
+from loco_drake.engine.local import LOCAL
 from loco_drake.evaluation.gait_change_time import gait_change_figures
 from loco_drake.evaluation.motion_scores import median
 from loco_drake.evaluation.steering import (
@@ -320,8 +321,8 @@ def _from_table(table: Sequence[Any] | Array, sample: int, *, period: int) -> An
 
 
 def run_courses(
-    scenario: Scenario, courses: Sequence[Course], workers: int = 1
+    scenario: Scenario, courses: Sequence[Course], executor: Executor = LOCAL
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yields label and figures of each course, in order."""
-    results = map_in_workers(partial(Driver, scenario), courses, workers)
+    results = executor.map(partial(Driver, scenario), courses)
     return zip((course.label for course in courses), results, strict=True)

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from loco_drake.common.arrays import Array
-from loco_drake.common.parallel import map_in_workers
 from loco_drake.control.ground_path import ground_pose, path_velocity
 from loco_drake.control.plan import PLAN_DT, Plan
+from loco_drake.engine.executor import Executor
+from loco_drake.engine.local import LOCAL
 from loco_drake.evaluation.motion_scores import median
 from loco_drake.evaluation.naturalness import WAYS
 from loco_drake.evaluation.steering import rmse, stride_velocity
@@ -109,8 +110,8 @@ def _mean(driver: Driver, name: str) -> Array:
 
 
 def compare_ways(
-    scenario: Scenario, courses: Sequence[Course], workers: int = 1
+    scenario: Scenario, courses: Sequence[Course], executor: Executor = LOCAL
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yields label and figures of each course, which has a range, in order."""
-    results = map_in_workers(partial(_Ways, scenario), courses, workers)
+    results = executor.map(partial(_Ways, scenario), courses)
     return zip((course.label for course in courses), results, strict=True)

@@ -23,9 +23,10 @@ import numpy as np
 
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
-from loco_drake.common.parallel import map_in_workers
 from loco_drake.control.plan import PLAN_DT, plan_from_motion
 from loco_drake.datasets.segments import Segment, select_labels
+from loco_drake.engine.executor import Executor
+from loco_drake.engine.local import LOCAL
 from loco_drake.evaluation.motion_scores import median
 from loco_drake.evaluation.mujoco import MujocoRecorder
 from loco_drake.evaluation.tracking import (
@@ -167,7 +168,7 @@ def retargeted_trials(
 def run_trials(
     scenario: Scenario,
     trials: Sequence[Trial],
-    workers: int = 1,
+    executor: Executor = LOCAL,
     randomization: RandomizationConfig | None = None,
     mujoco: MujocoConfig | None = None,
 ) -> Iterator[Episode]:
@@ -177,7 +178,7 @@ def run_trials(
         scenario: scenario with a generated reference, or a PlanReference if the trials
             have segments.
         trials: trials, all of one kind.
-        workers: number of processes.
+        executor: simulates the trials.
         randomization: distribution of each trial's world, by its label and seed.
         mujoco: simulates in MuJoCo, where nothing is randomized, instead of Drake.
     """
@@ -190,7 +191,7 @@ def run_trials(
     if mujoco is not None and not randomization.is_off:
         raise ValueError("worlds are randomized in Drake only")
     make = partial(_Runner, scenario, randomization, mujoco)
-    return map_in_workers(make, trials, workers)
+    return executor.map(make, trials)
 
 
 def summarize(episodes: Sequence[Episode]) -> dict[str, Any]:

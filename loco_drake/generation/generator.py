@@ -78,7 +78,8 @@ class RotaryAttention(nn.Module):
         # (B, T, 3 * width) -> (3, B, heads, T, size)
         qkv = self.qkv(x).view(batch, time, 3, self.heads, -1).permute(2, 0, 3, 1, 4)
         start = 0 if past is None else past[0].shape[2]
-        angles = torch.arange(start, start + time)[:, None] * self.rates
+        times = torch.arange(start, start + time, device=x.device)
+        angles = times[:, None] * self.rates
         q, k = turn_channels(qkv[:2], angles.cos(), angles.sin())
         v = qkv[2]
         if past is not None:
@@ -188,7 +189,8 @@ class Generator(nn.Module):
         Raises:
             ValueError: if it was not taught to be told velocities.
         """
-        offset = torch.arange(self.config.codebooks) * (self.config.codebook_size + 1)
+        books = torch.arange(self.config.codebooks, device=before.device)
+        offset = books * (self.config.codebook_size + 1)
         x = self.codes_in(before + offset).sum(dim=-2)  # (B, T, width)
         if velocities is not None:
             if self.telling is None:

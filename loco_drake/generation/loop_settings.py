@@ -24,6 +24,8 @@ class LoopSettings:
     weight_decay: float = 0.01
     # Seed: of the initial weights and the batches.
     seed: int = 0
+    # Where the network learns, see common.device.
+    device: str = "cpu"
     # Continue what is in --out: from its checkpoint, with the options of that run, of
     # which only --steps may increase.
     resume: bool = False

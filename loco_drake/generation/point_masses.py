@@ -25,18 +25,21 @@ from loco_drake.motion.motion import FPS
 _CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 _POINTS = len(_CORNERS)  # of a body
 REGULARIZATION = 0.1  # of the forces in PointMasses.unexplained
-_DOWN = torch.tensor([0.0, 0.0, 1.0])
+_DOWN = (0.0, 0.0, 1.0)
 
 
 class PointMasses:
     """Robots as points, named in order."""
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(
+        self, names: Sequence[str], device: torch.device | str = "cpu"
+    ) -> None:
         robots = [get_robot(name) for name in names]
         bodies = [_bodies(robot) for robot in robots]
 
         def table(values: list[Array]) -> Tensor:
-            return torch.tensor(np.array(values), dtype=torch.float32)
+            array = np.array(values)
+            return torch.tensor(array, dtype=torch.float32, device=device)
 
         self._hips = table([r.p_BHip for r in robots])
         self._offset = table([r.abduction_offset for r in robots])
@@ -117,16 +120,17 @@ class PointMasses:
         com = (self._shares[robot][:, None, :, None] * points).sum(dim=2)
         # To the soles, in standing heights.
         arms = (toes - com[:, :, None]) / self._height[robot, None, None, None]
-        arms = arms[:, 1:-1] - self._radius[robot][:, None, None] * _DOWN
+        down = torch.tensor(_DOWN, device=arms.device)
+        arms = arms[:, 1:-1] - self._radius[robot][:, None, None] * down
         x, y, z = arms.unbind(-1)  # (B, T - 2, 4)
         zero = torch.zeros_like(x)
-        force = torch.eye(3).expand(*x.shape, 3, 3)
+        force = torch.eye(3, device=x.device).expand(*x.shape, 3, 3)
         rows = torch.stack((zero, -z, y, z, zero, -x, -y, x, zero), dim=-1)
         moment = rows.reshape(*x.shape, 3, 3)
         grasp = torch.cat((moment, force), dim=-2)  # (B, T - 2, 4, 6, 3)
         grasp = grasp * target[:, 1:-1, ft.CONTACTS, None, None]
         spread = torch.einsum("btlij,btlkj->btik", grasp, grasp) / REGULARIZATION
-        weight = torch.linalg.inv(torch.eye(6) + spread)
+        weight = torch.linalg.inv(torch.eye(6, device=x.device) + spread)
         wanted = self._wrench(target, points, robot)
         error = self.wrench(output, robot) - wanted
         return torch.einsum("bti,btij,btj->bt", error, weight, error)

@@ -18,12 +18,14 @@ from loco_drake.motion.motion import FPS
 class Toes:
     """Differentiable kinematics of several robots, named in order, in one batch."""
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(
+        self, names: Sequence[str], device: torch.device | str = "cpu"
+    ) -> None:
         robots = [get_robot(name) for name in names]
 
         def table(name: str) -> Tensor:
             values = np.array([getattr(robot, name) for robot in robots])
-            return torch.tensor(values, dtype=torch.float32)
+            return torch.tensor(values, dtype=torch.float32, device=device)
 
         self.hips = table("p_BHip")
         self.offset = table("abduction_offset")

@@ -12,6 +12,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from loco_drake.common.determinism import single_thread
+from loco_drake.common.device import find_device
 from loco_drake.common.errors import InputError
 from loco_drake.common.weights import save_network
 from loco_drake.generation import speed_rank
@@ -119,11 +120,12 @@ def train_generator(
     found = speed_rank.speed_edges((each.label, each.speeds) for each in encoded)
     generator.speed_edges.copy_(torch.from_numpy(found))
     edges = generator.speed_edges.numpy()
+    device = find_device(settings.device)
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         chosen = [encoded[i] for i in random.integers(len(encoded), size=BATCH)]
         batch = make_batch(config, edges, chosen, random)
-        return generator_loss(generator, (*batch[:5], None)), {}
+        return generator_loss(generator, on_device((*batch[:5], None), device)), {}
 
     run = {
         "network": asdict(config),
@@ -187,6 +189,19 @@ def make_batch(
         torch.from_numpy(duration_bin(seconds)),
         torch.from_numpy(codes),
         torch.from_numpy(velocities),
+    )
+
+
+def on_device(batch: Batch, device: torch.device) -> Batch:
+    """Returns a batch on a device."""
+    before, labels, speed_bins, duration, codes, velocities = batch
+    return (
+        before.to(device),
+        labels.to(device),
+        speed_bins.to(device),
+        duration.to(device),
+        codes.to(device),
+        None if velocities is None else velocities.to(device),
     )
 
 

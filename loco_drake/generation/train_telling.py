@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from loco_drake.common.device import find_device
 from loco_drake.common.errors import InputError
 from loco_drake.common.weights import load_weights, save_network
 from loco_drake.generation.generator import Generator, load_generator
@@ -21,6 +22,7 @@ from loco_drake.generation.train_generator import (
     encode_clips,
     generator_loss,
     make_batch,
+    on_device,
     stitched_clips,
 )
 from loco_drake.generation.training import LoopResult, train
@@ -78,13 +80,15 @@ def train_telling(
     for name, found in zip(("low", "high"), bounds, strict=True):
         getattr(telling, name).copy_(torch.from_numpy(found))
     edges = generator.speed_edges.numpy()
+    device = find_device(settings.device)
+    generator.to(device)
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         chosen = [encoded[i] for i in random.integers(len(encoded), size=BATCH)]
         batch = make_batch(config, edges, chosen, random)
         assert batch[5] is not None
         told = as_commands(batch[5], random)
-        return generator_loss(generator, (*batch[:5], told)), {}
+        return generator_loss(generator, on_device((*batch[:5], told), device)), {}
 
     run = {
         "network": asdict(config),
@@ -93,6 +97,7 @@ def train_telling(
         "taught": sha256(Path(path).read_bytes()).hexdigest(),
     }
     result = train("generator", telling, loss_of_batch, settings, run)
+    generator.cpu()
     if not result.stopped:
         record = {**training_record(library, settings), "stitched": stitched}
         out = Path(settings.out) / "generator.safetensors"

@@ -17,6 +17,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 from vector_quantize_pytorch import ResidualVQ
 
+from loco_drake.common.device import find_device
 from loco_drake.common.errors import InputError
 from loco_drake.common.weights import save_network
 from loco_drake.generation.features import CONTACTS
@@ -64,7 +65,9 @@ class Scales:
     gaits its jitter would have no weight. Labels without clips get the scales of all.
     """
 
-    def __init__(self, clips: Sequence[Clip]) -> None:
+    def __init__(
+        self, clips: Sequence[Clip], device: torch.device | str = "cpu"
+    ) -> None:
         by_label: dict[int, list[Array]] = defaultdict(list)
         for clip in clips:
             by_label[clip.label.index].append(clip.features[:, : CONTACTS.start])
@@ -74,7 +77,8 @@ class Scales:
         # Do not amplify features that hardly vary.
         scales = np.sqrt(np.maximum(table, LEAST_SHARE**2 * everything))
         scales = np.maximum(scales, np.array(LEAST_SCALES)[:, None])
-        self._scales = torch.tensor(scales, dtype=torch.float32)  # (labels, 3, ...)
+        # (labels, 3, ...)
+        self._scales = torch.tensor(scales, dtype=torch.float32, device=device)
 
     def __call__(self, label: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Returns those of deviations, changes and jitter, (N, 1, ...), for (N,)."""
@@ -153,15 +157,17 @@ def train_tokenizer(
         learning.tokenizer.decoder_out.weight.mul_(0.01)
     frames = np.concatenate([clip.features for clip in clips])
     learning.tokenizer.set_statistics(torch.tensor(frames, dtype=torch.float32))
-    toes, masses = Toes(config.robots), PointMasses(config.robots)
+    device = find_device(settings.device)
+    toes = Toes(config.robots, device)
+    masses = PointMasses(config.robots, device)
     windows = PairedWindows(clips, config.robots)
-    scales = Scales(clips)
+    scales = Scales(clips, device)
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
-        target, robot, label = windows(random, BATCH)
+        target, robot, label = (x.to(device) for x in windows(random, BATCH))
         losses = tokenizer_losses(learning, toes, masses, scales(label), target, robot)
         weighted = (WEIGHTS[name] * loss for name, loss in losses.items())
-        total = sum(weighted, torch.zeros(()))
+        total = sum(weighted, torch.zeros((), device=device))
         return total, {name: loss.item() for name, loss in losses.items()}
 
     network, motions = asdict(config), library.summary

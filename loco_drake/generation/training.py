@@ -14,6 +14,7 @@ from torch.utils.tensorboard import SummaryWriter
 
 from loco_drake.common import run_folder
 from loco_drake.common.determinism import single_thread
+from loco_drake.common.device import find_device
 from loco_drake.common.progress import progress_bar
 from loco_drake.generation.loop_settings import RUN_SETTINGS, LoopSettings
 
@@ -38,7 +39,7 @@ def train(
     config: LoopSettings,
     run: Mapping[str, Any],
 ) -> LoopResult:
-    """Trains ``module`` in place.
+    """Trains ``module`` in place, on the device of its settings; it is on the CPU then.
 
     After Ctrl-C (or SIGTERM) the current step is completed and a checkpoint saved. A
     resumed run computes what the uninterrupted run would have computed, bit for bit.
@@ -46,14 +47,17 @@ def train(
     Args:
         name: of checkpoint, weights and progress bar: "tokenizer", "generator", ...
         module: what to train.
-        loss_of_batch: see :data:`LossFunction`.
+        loss_of_batch: see :data:`LossFunction`; it computes on that device.
         config: how to train.
         run: what the run depends on besides, as JSON.
 
     Raises:
-        InputError: see :func:`loco_drake.common.run_folder.open_run`.
+        InputError: see :func:`loco_drake.common.run_folder.open_run`; or if there is
+            no such device.
     """
     config.check()
+    device = find_device(config.device)
+    module.to(device)
     start = time.perf_counter()
     run = run_folder.settings(
         {**{key: getattr(config, key) for key in RUN_SETTINGS}, **run}
@@ -75,7 +79,7 @@ def train(
             options=run_folder.options_of(config),
         ) as folder,
         run_folder.stop_requests() as stop_requested,
-        torch.random.fork_rng(devices=[]),
+        torch.random.fork_rng(devices=[] if device.type == "cpu" else [device]),
     ):
         torch.manual_seed(config.seed)
         step = 0
@@ -114,6 +118,7 @@ def train(
                     save()
         save()
         module.eval()
+    module.cpu()
     seconds = time.perf_counter() - start
     return LoopResult(step, step < config.steps, last, seconds)
 

@@ -1,5 +1,6 @@
 """Reads and writes Motion files: an ``.npz`` of arrays with a JSON header."""
 
+import io
 import json
 import math
 import sys
@@ -25,9 +26,20 @@ _FLOATS = (("f", 4), ("f", 8))
 
 def save_motion(motion: Motion, path: Path) -> None:
     """Writes ``motion`` to a self-describing ``.npz``, atomically."""
+    write_motion(motion_bytes(motion), path)
+
+
+def write_motion(content: bytes, path: Path) -> None:
+    """Writes what :func:`motion_bytes` returned to a Motion file, atomically."""
     path = Path(path)
     if path.suffix != ".npz":
         raise InputError(f"A Motion file must be named *.npz, not {quoted(path.name)}.")
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def motion_bytes(motion: Motion) -> bytes:
+    """Returns the content of a Motion file."""
     header: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "robot": motion.robot,
@@ -43,8 +55,9 @@ def save_motion(motion: Motion, path: Path) -> None:
         header["gait_changes"] = changes
     arrays = {name: getattr(motion, name) for name in UNITS}
     header["content_sha256"] = _content_sha256(header, arrays)
-    with atomic_path(path) as temporary:
-        np.savez_compressed(temporary, header=json.dumps(header), **arrays)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, header=json.dumps(header), **arrays)
+    return buffer.getvalue()
 
 
 def load_motion(path: Path) -> Motion:

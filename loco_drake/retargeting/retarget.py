@@ -1,7 +1,7 @@
 """Retargeting of recordings to motions of a robot: one, or many in worker processes."""
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from loco_drake.common.errors import InputError
-from loco_drake.common.parallel import map_in_workers
 from loco_drake.datasets.segments import Segment
 from loco_drake.datasets.skeleton import load_sources, loaded_files
 from loco_drake.datasets.split import Split
+from loco_drake.engine.executor import Executor
+from loco_drake.engine.local import LOCAL
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.models.robot_files import load_robot
 from loco_drake.models.robots import get_robot
@@ -21,7 +22,7 @@ from loco_drake.motion import quality
 from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.motion.motion import FPS, Motion, make_motion
-from loco_drake.motion.motion_file import save_motion
+from loco_drake.motion.motion_file import motion_bytes, write_motion
 from loco_drake.retargeting.bounds import outside_bounds
 from loco_drake.retargeting.contacts import (
     detect_contacts,
@@ -225,44 +226,51 @@ def retarget_segments(
     robot: Quadruped,
     out_dir: Path,
     split: Split | None = None,
-    workers: int = 1,
+    executor: Executor = LOCAL,
     variant: Variant = AS_RECORDED,
 ) -> Iterator[Outcome]:
     """Retargets segments, and writes ``out_dir/SEGMENT.npz`` for each.
 
     The folder is made if need be, and files of the same name are replaced. A recording
     that cannot be read or retargeted is reported in its outcome and does not stop the
-    others. Each of the worker processes has only one clip at a time in memory.
+    others. Each worker has only one clip at a time in memory; this process writes the
+    files.
 
     Yields:
         One outcome for each segment, in their order, as soon as it is done.
     """
-    make = partial(
-        _make_writer, robot.definition, Path(out_dir), split, variant, loaded_files()
-    )
-    return map_in_workers(make, segments, workers)
-
-
-def _make_writer(
-    robot: str,
-    out_dir: Path,
-    split: Split | None,
-    variant: Variant,
-    skeletons: tuple[Path, ...],
-) -> Callable[[Segment], Outcome]:
-    load_sources(skeletons)
-    retarget = SegmentRetargeter(load_robot(robot), split, variant)
-
-    def write(segment: Segment) -> Outcome:
-        path = out_dir / f"{segment.name}.npz"
-        result = retarget(segment)
+    segments = list(segments)
+    make = partial(_Encoder, robot.definition, split, variant, loaded_files())
+    done = executor.map(make, segments)
+    for segment, result in zip(segments, done, strict=True):
+        path = Path(out_dir) / f"{segment.name}.npz"
         if isinstance(result, str):
-            return Outcome(segment, path, None, result)
-        _, motion, report = result
-        save_motion(motion, path)
-        return Outcome(segment, path, report, None)
+            yield Outcome(segment, path, None, result)
+            continue
+        content, report = result
+        write_motion(content, path)
+        yield Outcome(segment, path, report, None)
 
-    return write
+
+class _Encoder:
+    """Retargets segments, given a robot's definition, to the content of files."""
+
+    def __init__(
+        self,
+        robot: str,
+        split: Split | None,
+        variant: Variant,
+        skeletons: tuple[Path, ...],
+    ) -> None:
+        load_sources(skeletons)
+        self._retarget = SegmentRetargeter(load_robot(robot), split, variant)
+
+    def __call__(self, segment: Segment) -> tuple[bytes, RetargetReport] | str:
+        result = self._retarget(segment)
+        if isinstance(result, str):
+            return result
+        _, motion, report = result
+        return motion_bytes(motion), report
 
 
 def stretches_of(outcomes: Iterable[Outcome], split: Split) -> list[Stretch]:

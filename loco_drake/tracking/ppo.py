@@ -89,6 +89,7 @@ class AdaptivePPO(PPO):
     target: float
     rate: float
     critic_first: int  # environment steps in which only the critic learns
+    update_device: torch.device  # actions are chosen on the CPU
 
     def split_optimizer(self, critic_rate: float) -> None:
         """Creates separate parameter groups for actor and critic."""
@@ -101,7 +102,9 @@ class AdaptivePPO(PPO):
 
     def train(self) -> None:
         """Performs one update and adapts the learning rate."""
+        self._move(self.update_device)
         super().train()
+        self._move(torch.device("cpu"))
         if self._holds_actor:
             return
         kl = float(self.logger.name_to_value["train/approx_kl"])
@@ -109,6 +112,16 @@ class AdaptivePPO(PPO):
             self.rate = max(self.rate / 1.5, 1e-5)
         elif kl < self.target / 2:
             self.rate = min(self.rate * 1.5, 3e-3)
+
+    def _move(self, device: torch.device) -> None:
+        """Moves all that an update computes with to a device."""
+        if self.device == device:
+            return
+        self.policy.to(device)
+        self.rollout_buffer.device = self.device = device
+        for moments in self.policy.optimizer.state.values():
+            for name in ("exp_avg", "exp_avg_sq"):
+                moments[name] = moments[name].to(device)
 
     @property
     def statistics(self) -> RunningMeanStd:
@@ -127,8 +140,16 @@ class AdaptivePPO(PPO):
         return self.num_timesteps <= self.critic_first
 
 
-def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
-    """Returns a learner on ``environment`` with normalized observations."""
+def make_ppo(
+    environment: VecEnv,
+    config: PpoConfig,
+    seed: int,
+    device: torch.device | None = None,
+) -> AdaptivePPO:
+    """Returns a learner on ``environment`` with normalized observations.
+
+    Its updates are computed on the device, by default the CPU.
+    """
     normalized = VecNormalize(
         environment,
         norm_reward=False,
@@ -159,6 +180,7 @@ def make_ppo(environment: VecEnv, config: PpoConfig, seed: int) -> AdaptivePPO:
         seed=seed,
         device="cpu",
     )
+    learner.update_device = device or torch.device("cpu")
     learner.target = config.target_kl
     learner.rate = config.actor_rate
     learner.critic_first = config.critic_first

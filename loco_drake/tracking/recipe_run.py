@@ -66,7 +66,7 @@ def run_recipe(
     Raises:
         InputError: if the folder holds a run and ``resume`` is not set, or the other
             way round; if another process works in it; or if the recipe is another.
-        ChildProcessError: if a worker process is killed.
+        ChildProcessError: if workers die several times at the same step.
     """
     folder = Path(folder)
     check_recipe_folder(folder, resume=resume)

@@ -16,10 +16,13 @@ from torch import Tensor
 
 from loco_drake.common import run_folder
 from loco_drake.common.determinism import single_thread
+from loco_drake.common.device import find_device
 from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import Checkpoint, RunFolder
 from loco_drake.control.actor import ActorConfig
 from loco_drake.control.plan import Plan
+from loco_drake.engine.executor import Executor
+from loco_drake.engine.local import LOCAL
 from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.tracking.beginning import (
     LAYOUT,
@@ -50,13 +53,15 @@ def train_tracker(
     first: Path | None = None,
     options: Mapping[str, Any] | None = None,
     report: Report = lambda steps, scores: None,
+    executor: Executor = LOCAL,
+    device: str = "cpu",
 ) -> dict[str, Any]:
     """Trains a policy to track ``plans``.
 
     After each batch it writes ``checkpoint.safetensors``, from which training can
     resume, ``policy.safetensors``, which the diagram loads, ``progress.jsonl`` and
     TensorBoard logs to ``folder``. An interruption (Ctrl-C), or being killed, loses at
-    most the current batch.
+    most the current batch; a worker that dies is replaced, and costs nothing.
 
     Args:
         plans: what to follow.
@@ -67,6 +72,8 @@ def train_tracker(
             learning rate are those to begin with; all else begins anew.
         options: of the command, for :func:`.run_folder.open_run`.
         report: called after each batch.
+        executor: where the workers run; the results do not depend on it.
+        device: where the updates are computed, see :func:`.find_device`.
 
     Returns:
         steps, wall_clock_s of this run, interrupted, the scores by label, the robot,
@@ -74,8 +81,8 @@ def train_tracker(
 
     Raises:
         InputError: see :func:`.run_folder.open_run`; or if there is nothing to begin
-            with, or it has other networks or observations.
-        ChildProcessError: if a worker process is killed.
+            with, it has other networks or observations, or there is no such device.
+        ChildProcessError: if workers die several times at the same step.
     """
     config.check()
     if resume and first is not None:
@@ -89,6 +96,7 @@ def train_tracker(
         "references": f"{len(plans)} motions of {sum(map(len, plans))} samples",
         "observation_layout": LAYOUT,
     }
+    learns_on = find_device(device)
     beginning = None if first is None else read_beginning(first, config.ppo.hidden)
     sampler = PlanSampler(
         plans,
@@ -122,9 +130,10 @@ def train_tracker(
             reward_scale=1 - config.ppo.gamma,
             # Episodes after a resume are new ones.
             seed=config.seed + steps_before,
+            executor=executor,
         )
         try:
-            learner = make_ppo(environment, config.ppo, config.seed)
+            learner = make_ppo(environment, config.ppo, config.seed, learns_on)
             if beginning is not None:
                 beginning.load(learner)
                 if config.ppo.restart_log_std is not None:

@@ -62,7 +62,7 @@ def train_student(
     Raises:
         InputError: see :func:`.run_folder.open_run`; or if the teacher is missing,
             of another robot, or lacks privileged observations itself.
-        ChildProcessError: if a worker process is killed.
+        ChildProcessError: if workers die several times at the same step.
     """
     config.check()
     actor = load_actor(teacher, get_robot(config.environment.robot))

@@ -1,11 +1,8 @@
 """A vectorized environment with many environments in each of several processes."""
 
-import contextlib
-import gc
-import multiprocessing
-import signal
+from collections import deque
+from functools import partial
 from itertools import chain
-from multiprocessing.connection import Connection
 from typing import Any
 
 import gymnasium
@@ -13,95 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from loco_drake.common.determinism import use_one_thread
 from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.control.plan import Plan
-from loco_drake.tracking.batch import TrackingBatch
+from loco_drake.engine.executor import TRIES, Executor, WorkerDiedError
+from loco_drake.engine.local import LOCAL
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
-from loco_drake.tracking.sampler import PlanSampler, Start
+from loco_drake.tracking.sampler import PlanSampler
+from loco_drake.tracking.simulation import (
+    Beginning,
+    Past,
+    Reply,
+    Reset,
+    Restore,
+    Simulation,
+    Step,
+)
 
 TWO_OBSERVATIONS_SPACE = gymnasium.spaces.Box(
     -np.inf, np.inf, (2 * OBSERVATION_SIZE,), np.float32
 )
-# Share of the terminated episodes that are retried from a number of samples before the
-# failure, so that difficult moments are practised most.
-_RETRIED = 0.5
-_LEAD = (25, 125)  # least and most
-
-_DIED = "A worker process died; training goes on from its checkpoint with --resume."
-
-
-def _work(
-    pipe: Connection,
-    plans: list[Plan],
-    config: EnvironmentConfig,
-    seeds: list[int],
-    exact: bool,
-) -> None:
-    """Serves messages with actions and the starts of the next episodes."""
-    # Ctrl-C reaches the whole process group; only the trainer handles it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    use_one_thread()
-    batch = TrackingBatch(plans, config, len(seeds))
-    random = [np.random.default_rng(seed) for seed in seeds]
-    # Exclude permanent objects from garbage collection.
-    gc.freeze()
-    try:
-        while (message := pipe.recv()) is not None:
-            actions, starts = message
-            if actions is None:
-                for i in range(len(seeds)):
-                    batch.reset(i, random[i], *starts[i])
-                pipe.send(_observe(batch, exact))
-            else:
-                pipe.send(_step(batch, actions, starts, random, exact))
-    except (EOFError, ConnectionError):
-        pass  # The trainer is gone.
-
-
-def _observe(
-    batch: TrackingBatch,
-    exact: bool,
-    robots: NDArray[np.int64] | slice = slice(None),
-) -> NDArray[np.float32]:
-    """Returns observations as measured and, if wanted, behind them exact ones."""
-    seen = batch.observe(robots)
-    return np.hstack((seen, batch.observe(robots, exact=True))) if exact else seen
-
-
-def _step(
-    batch: TrackingBatch,
-    actions: NDArray[np.float32],
-    starts: list[Start],
-    random: list[np.random.Generator],
-    exact: bool,
-) -> tuple[Any, ...]:
-    """Steps all robots and resets those whose episodes ended, as VecEnv requires.
-
-    Returns observations, rewards without penalties, penalties, dones and infos.
-    """
-    terms, terminated, truncated = batch.step(actions)
-    observations = _observe(batch, exact)
-    done = terminated | truncated
-    infos: list[dict[str, Any]] = [{} for _ in starts]
-    ended = np.flatnonzero(done)
-    for i in ended:
-        infos[i] = {
-            "plan": int(batch.plan[i]),
-            "samples": (int(batch.start[i]), int(batch.sample[i])),
-            "retried": bool(terminated[i]) and random[i].random() < _RETRIED,
-            "TimeLimit.truncated": bool(truncated[i]),
-            "terminal_observation": observations[i].copy(),
-        }
-        plan, sample = starts[i]
-        if infos[i]["retried"]:
-            lead = int(random[i].integers(*_LEAD))
-            plan, sample = int(batch.plan[i]), max(0, int(batch.sample[i]) - lead)
-        batch.reset(int(i), random[i], plan, sample)
-    if len(ended):
-        observations[ended] = _observe(batch, exact, ended)
-    return observations, terms.sum(axis=-1), batch.penalty, done, infos
 
 
 class WorkerVecEnv(VecEnv):
@@ -112,8 +40,11 @@ class WorkerVecEnv(VecEnv):
     ``exact``, observations (OBSERVATION_SIZE,) are followed by those of the true state,
     without the sensors' errors.
 
+    A worker that dies is replaced by one that repeats the episodes which were going on:
+    the results are the same as if none had died.
+
     Raises:
-        ChildProcessError: from stepping, if a worker process was killed.
+        ChildProcessError: if workers died TRIES times at the same step.
     """
 
     render_mode: str | None = None  # VecEnv asks for it
@@ -129,6 +60,7 @@ class WorkerVecEnv(VecEnv):
         seed: int,
         reward_scale: float = 1.0,
         exact: bool = False,
+        executor: Executor = LOCAL,
     ) -> None:
         space = TWO_OBSERVATIONS_SPACE if exact else OBSERVATION_SPACE
         super().__init__(workers * per_worker, space, ACTION_SPACE)
@@ -142,42 +74,46 @@ class WorkerVecEnv(VecEnv):
         self._retrying = np.zeros(self.num_envs, dtype=bool)
         self._returns = np.zeros(self.num_envs)
         self._lengths = np.zeros(self.num_envs, dtype=int)
-        # Fork would copy the threads' locks of torch and Drake.
-        context = multiprocessing.get_context("spawn")
-        self._pipes: list[Connection] = []
-        self._processes = []
+        # What repeats the episodes that are going on.
+        self._beginnings: dict[int, Beginning] = {}
+        self._actions: deque[NDArray[np.float32]] = deque(maxlen=config.episode_steps)
         seeds = np.random.SeedSequence(seed).generate_state(self.num_envs).tolist()
-        for w in range(workers):
-            ours, theirs = context.Pipe()
-            own = seeds[w * per_worker : (w + 1) * per_worker]
-            process = context.Process(
-                target=_work, args=(theirs, plans, config, own, exact), daemon=True
-            )
-            process.start()
-            theirs.close()
-            self._pipes.append(ours)
-            self._processes.append(process)
+        self._own = [
+            slice(w * per_worker, (w + 1) * per_worker) for w in range(workers)
+        ]
+        self._crew = executor.crew(
+            partial(Simulation, plans, config, exact), [seeds[own] for own in self._own]
+        )
+        self._sent: list[Reset | Step] = []
 
     def reset(self) -> NDArray[np.float32]:
         """Starts a new episode everywhere; returns observations (num_envs, size)."""
-        self._send(None)
+        self._send([Reset(self._starts[own]) for own in self._own])
         self._starts = [self._sampler.draw_start() for _ in self._starts]
+        replies = self._receive()
+        self._actions.clear()
         self._retrying[:] = False
         self._returns[:] = 0
         self._lengths[:] = 0
-        return np.concatenate(self._receive())
+        return np.concatenate([reply.observations for reply in replies])
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Sends actions to every worker."""
-        self._send(actions)
+        self._send([Step(actions[own], self._starts[own]) for own in self._own])
+        # What asked may use the memory of its actions again.
+        self._last = np.array(actions)
 
     def step_wait(
         self,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[Any]]:
         """Returns observations, rewards, dones and infos."""
-        *arrays, of_workers = zip(*self._receive(), strict=True)
-        observations, returns, penalties, dones = map(np.concatenate, arrays)
-        infos = list(chain.from_iterable(of_workers))
+        replies = self._receive()
+        self._actions.append(self._last)
+        observations, returns, penalties, dones = (
+            np.concatenate([getattr(reply, name) for reply in replies])
+            for name in ("observations", "returns", "penalties", "dones")
+        )
+        infos = list(chain.from_iterable(reply.infos for reply in replies))
         self._returns += returns
         self._lengths += 1
         for i in np.flatnonzero(dones):
@@ -199,30 +135,49 @@ class WorkerVecEnv(VecEnv):
 
     def close(self) -> None:
         """Ends the workers."""
-        for pipe in self._pipes:
-            with contextlib.suppress(OSError):  # a broken pipe
-                pipe.send(None)
-            pipe.close()
-        for process in self._processes:
-            process.join(timeout=5)
-            if process.is_alive():
-                process.kill()
-        self._pipes, self._processes = [], []
+        self._crew.close()
 
-    def _send(self, actions: NDArray[np.float32] | None) -> None:
-        for w, pipe in enumerate(self._pipes):
-            own = slice(w * self._per_worker, (w + 1) * self._per_worker)
-            theirs = None if actions is None else actions[own]
+    def _send(self, messages: list[Any]) -> None:
+        self._sent = messages
+        for w, message in enumerate(messages):
+            self._crew.send(w, message)
+
+    def _receive(self) -> list[Reply]:
+        replies = [self._answer(w) for w in range(len(self._own))]
+        for own, reply in zip(self._own, replies, strict=True):
+            for i, beginning in reply.beginnings.items():
+                self._beginnings[own.start + i] = beginning
+        return replies
+
+    def _answer(self, w: int) -> Reply:
+        """Returns a worker's reply, or if it has died, that of a new one."""
+        for tries in range(TRIES):
             try:
-                pipe.send((theirs, self._starts[own]))
-            except OSError:  # a broken pipe
-                raise ChildProcessError(_DIED) from None
+                if tries:
+                    self._crew.replace(w)
+                    self._restore(w)
+                    self._crew.send(w, self._sent[w])
+                reply: Reply = self._crew.receive(w)
+                return reply
+            except WorkerDiedError:
+                continue
+        raise WorkerDiedError(
+            f"A worker process died {TRIES} times at the same step; training goes on "
+            "from its checkpoint with --resume."
+        )
 
-    def _receive(self) -> list[Any]:
-        try:
-            return [pipe.recv() for pipe in self._pipes]
-        except (EOFError, ConnectionResetError):
-            raise ChildProcessError(_DIED) from None
+    def _restore(self, w: int) -> None:
+        """Gives a new worker the state of the one before it."""
+        if not self._beginnings:
+            return
+        own, before = self._own[w], list(self._actions)
+        pasts = []
+        for i in range(own.start, own.stop):
+            steps = before[len(before) - self._lengths[i] :]
+            actions = np.array([step[i] for step in steps], np.float32).reshape(-1, 12)
+            pasts.append(Past(self._beginnings[i], actions))
+        self._crew.send(w, Restore(pasts))
+        self._crew.receive(w)
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """Returns an attribute of this object, once for each environment."""

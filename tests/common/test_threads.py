@@ -17,6 +17,8 @@ def show(x=None):
     return torch.get_num_threads(), max(pools)
 def make():
     return show
+def show_as(argument):
+    return show
 """
 SCRIPTS = {
     "a user's process that imports everything": (
@@ -36,16 +38,16 @@ SCRIPTS = {
         1,
     ),
     "workers": (
-        "from loco_drake.common.parallel import map_in_workers\n"
-        "print(*max(map_in_workers(make, range(4), 2)))",
+        "from loco_drake.engine.local import Local\n"
+        "print(*max(Local(2).map(make, range(4))))",
         1,
     ),
     "workers of a training": (
-        "import loco_drake.tracking.workers as workers\n"
-        "class Pipe:\n"
-        "    def recv(self): print(*show())\n"
-        "workers.TrackingBatch = lambda plans, config, count: None\n"
-        "workers._work(Pipe(), [], None, [], False)",
+        "from loco_drake.engine.local import Local\n"
+        "crew = Local().crew(show_as, [None])\n"
+        "crew.send(0, None)\n"
+        "print(*crew.receive(0))\n"
+        "crew.close()",
         1,
     ),
 }

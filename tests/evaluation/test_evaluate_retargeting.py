@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from loco_drake.datasets.segments import Segment, read_segments
+from loco_drake.engine.local import Local
 from loco_drake.evaluation.retargeting import (
     ClipScore,
     FailedClip,
@@ -110,7 +111,7 @@ def test_made_dogs_are_scored_alike_by_one_process_and_by_two(made_data):
     segments = read_segments(made_data)
     robot = get_robot("go2")
     alone = list(score_segments(segments, robot))
-    shared = list(score_segments(segments, robot, workers=2))
+    shared = list(score_segments(segments, robot, Local(2)))
     assert [s.segment for s in shared] == [s.segment for s in alone] == segments
     for a, b in zip(alone, shared, strict=True):
         np.testing.assert_array_equal(a.slip_speeds, b.slip_speeds)

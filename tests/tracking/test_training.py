@@ -1,5 +1,4 @@
 import json
-import os
 import signal
 
 import numpy as np
@@ -20,6 +19,7 @@ from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
 from loco_drake.tracking.config import EnvironmentConfig, PpoConfig, TrainingConfig
+from loco_drake.tracking.ppo import make_ppo
 from loco_drake.tracking.randomization import STANDARD
 from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.train import train_tracker
@@ -332,21 +332,6 @@ def test_nothing_cannot_be_resumed(plans, tmp_path):
     assert not (tmp_path / "none").exists()
 
 
-def test_a_killed_worker_is_reported(plans):
-    sampler = PlanSampler(plans, 0)
-    workers = WorkerVecEnv(
-        plans, EnvironmentConfig(), sampler, workers=1, per_worker=1, seed=0
-    )
-    try:
-        workers.reset()
-        os.kill(workers._processes[0].pid, signal.SIGKILL)
-        workers._processes[0].join()
-        with pytest.raises(ChildProcessError, match="worker process died"):
-            workers.step(np.zeros((1, 12), dtype=np.float32))
-    finally:
-        workers.close()
-
-
 def test_the_position_penalty_is_no_part_of_returns(plans):
     """The same steps are rewarded less, and score the same."""
     rewards, returns = [], []
@@ -456,3 +441,32 @@ def test_a_plan_is_scored_by_its_last_few_episodes(plans):
         sampler.record(0, score, 1.0)
         assert sampler.plan_scores[0] == pytest.approx(expected)
     assert np.isnan(sampler.plan_scores[1:]).all()
+
+
+def test_an_update_moves_all_that_it_computes_with(plans):
+    """To a device without values, which any machine has."""
+    workers = WorkerVecEnv(
+        plans,
+        EnvironmentConfig(),
+        PlanSampler(plans, 0),
+        workers=1,
+        per_worker=2,
+        seed=0,
+    )
+    try:
+        learner = make_ppo(workers, PpoConfig(batch=4, minibatch=2, hidden=[8]), 0)
+        learner.learn(8)  # gives the optimizer its moments
+    finally:
+        workers.close()
+    meta = torch.device("meta")
+    learner._move(meta)
+    moments = [
+        moment
+        for of in learner.policy.optimizer.state.values()
+        for name, moment in of.items()
+        if name != "step"
+    ]
+    tensors = [*learner.policy.state_dict().values(), *learner.policy.buffers()]
+    assert len(moments) == 2 * len(list(learner.policy.parameters()))
+    assert {tensor.device for tensor in (*tensors, *moments)} == {meta}
+    assert learner.rollout_buffer.device == learner.policy.device == meta
