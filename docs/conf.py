@@ -51,6 +51,7 @@ apidoc_modules = [
     }
 ]
 autodoc_member_order = "bysource"
+autodoc_mock_imports = ["ray"]  # an extra
 autodoc_typehints = "description"
 autodoc_class_signature = "separated"
 autodoc_inherit_docstrings = False  # LeafSystem's tell nothing of its children
