@@ -8,7 +8,7 @@ from pydrake.visualization import ModelVisualizer
 
 from loco_drake.common.errors import InputError
 
-from .robots import ConfigureParser, get_robot
+from .robots import get_robot
 
 
 def show(
@@ -19,18 +19,17 @@ def show(
     """Shows a robot in Meshcat: its links, frames, toes and joints.
 
     Args:
-        robot: go2 or a1.
+        robot: go2, a1, or a robot's YAML file.
         visualize_frames: draw each link's frame.
         loop_once: draw it once and quit, for tests.
     """
     try:
         model = get_robot(robot)
         visualizer = ModelVisualizer(visualize_frames=visualize_frames)
-        ConfigureParser(visualizer.parser())
+        model.AddModel(visualizer.parser(), visual=True)
     except InputError as error:
         print(error, file=sys.stderr)
         return 2
-    visualizer.AddModels(url=model.url)
     stance = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, model.stand_height, *model.stand_joints]
     visualizer.Run(position=stance, loop_once=loop_once)
     return 0

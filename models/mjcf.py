@@ -12,6 +12,7 @@ from pydrake.multibody.tree import JacobianWrtVariable, RevoluteJoint, RigidBody
 from pydrake.systems.framework import Context, DiagramBuilder
 
 from .robots import Robot
+from .xml_text import add_element
 
 TIME_STEP = 0.002  # s
 # Elliptic cones and stiff friction: otherwise feet creep in stance.
@@ -70,15 +71,17 @@ class _Writer:
     def model(self) -> ET.Element:
         robot = self._robot
         root = ET.Element("mujoco", model=robot.name)
-        _add(root, "compiler", angle="radian", inertiafromgeom="false")
-        _add(root, "option", timestep=TIME_STEP, gravity=[0, 0, -_GRAVITY], **OPTIONS)
-        world = _add(root, "worldbody")
+        add_element(root, "compiler", angle="radian", inertiafromgeom="false")
+        add_element(
+            root, "option", timestep=TIME_STEP, gravity=[0, 0, -_GRAVITY], **OPTIONS
+        )
+        world = add_element(root, "worldbody")
         # Bits of contype and conaffinity: all shapes touch the ground only.
         ground = {"type": "plane", "size": [0, 0, 1], "contype": 1, "conaffinity": 0}
-        _add(world, "geom", name="ground", **ground)
+        add_element(world, "geom", name="ground", **ground)
         height = [0.0, 0.0, robot.stand_height]
         base = self._body(world, robot.trunk_frame, height)
-        _add(base, "freejoint", name="base")
+        add_element(base, "freejoint", name="base")
         self._inertia_and_shapes(base, robot.trunk_frame)
         bodies = {robot.trunk_frame: base}
         for name, armature in zip(
@@ -89,12 +92,12 @@ class _Writer:
             bodies[joint.child_body().name()] = self._leg_body(parent, joint, armature)
         self._actuators(root)
         stand = [*height, 1.0, 0.0, 0.0, 0.0, *robot.stand_joints]
-        key = _add(root, "keyframe")
-        _add(key, "key", name="stand", qpos=stand, ctrl=robot.stand_joints)
+        key = add_element(root, "keyframe")
+        add_element(key, "key", name="stand", qpos=stand, ctrl=robot.stand_joints)
         return root
 
     def _body(self, parent: ET.Element, name: str, position: Any) -> ET.Element:
-        return _add(parent, "body", name=name, pos=position)
+        return add_element(parent, "body", name=name, pos=position)
 
     def _leg_body(
         self, parent: ET.Element, joint: RevoluteJoint, armature: float
@@ -103,7 +106,7 @@ class _Writer:
         name = joint.child_body().name()
         body = self._body(parent, name, X_PJ.translation())
         limits = [*joint.position_lower_limits(), *joint.position_upper_limits()]
-        _add(
+        add_element(
             body,
             "joint",
             name=joint.name(),
@@ -122,7 +125,7 @@ class _Writer:
         # Older versions of MuJoCo find the principal axes to seven digits only.
         moments, axes = np.linalg.eigh(I_BBcm.CopyToFullMatrix3())
         axes[:, 0] *= np.linalg.det(axes)
-        _add(
+        add_element(
             element,
             "inertial",
             mass=M_BBo.get_mass(),
@@ -158,7 +161,7 @@ class _Writer:
         weight = self._robot.mass * _GRAVITY
         damping = material["hunt_crossley_dissipation"] * weight
         scale = (1 - _IMPEDANCE) * inverse_mass(self._plant, self._context, body)
-        _add(
+        add_element(
             element,
             "geom",
             name=self._inspector.GetName(geometry).split("::")[-1],
@@ -176,11 +179,11 @@ class _Writer:
 
     def _actuators(self, root: ET.Element) -> None:
         robot = self._robot
-        actuators = _add(root, "actuator")
+        actuators = add_element(root, "actuator")
         for name, kp, kd, effort in zip(
             robot.joint_names, robot.kp, robot.kd, robot.effort_limits, strict=True
         ):
-            _add(
+            add_element(
                 actuators,
                 "position",
                 name=name.removesuffix("_joint"),
@@ -208,17 +211,3 @@ def inverse_mass(plant: MultibodyPlant, context: Context, body: RigidBody) -> fl
     )
     M = plant.CalcMassMatrix(context)
     return float(np.trace(J @ np.linalg.solve(M, J.T))) / 3
-
-
-def _add(parent: ET.Element, tag: str, **attributes: Any) -> ET.Element:
-    """Adds an element; numbers are written with all their digits."""
-    return ET.SubElement(
-        parent, tag, {name: _text(value) for name, value in attributes.items()}
-    )
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, str):
-        return value
-    numbers = np.atleast_1d(value).astype(float).tolist()
-    return " ".join(repr(number).removesuffix(".0") for number in numbers)

@@ -13,8 +13,6 @@ from loco_drake.common.errors import InputError
 from .plant import PlantConfig
 from .robots import Robot, get_robot
 
-LEAST_PAYLOAD = -3.0  # kg; bounds hold down to this payload
-
 
 def SetTrunkLoad(
     trunk: RigidBody, context: Context, *, mass: float, p_shift_B: Array
@@ -44,7 +42,7 @@ def SetReflectedInertia(
     context: Context,
     inertia: Array,
 ) -> None:
-    """Sets the inertia of the rotors at the joints of Go2 or A1.
+    """Sets the inertia of the rotors at the joints of a robot.
 
     It is by actuator, kg m^2, shape (12,), and may be negative within bounds.
 

@@ -19,7 +19,7 @@ from loco_drake.common.errors import InputError, check_choice, check_number
 
 from .ground import AddGround
 from .movable_ground import FilterMovableGround
-from .robots import AddRobotModel, Robot
+from .robots import Robot
 
 CONTACTS = ("similar", "lagged", "sap", "cenic")
 
@@ -125,7 +125,7 @@ def AddRobotPlant(
     scene_graph_config = SceneGraphConfig()
     scene_graph_config.default_proximity_properties.resolution_hint = None
     scene_graph.set_config(scene_graph_config)
-    instance = AddRobotModel(Parser(plant), robot.name, visual=config.visual)
+    instance = robot.AddModel(Parser(plant), visual=config.visual)
     for joint, p, d in zip(robot.joint_names, robot.kp, damping, strict=True):
         actuator = plant.GetJointActuatorByName(joint.removesuffix("_joint"))
         actuator.set_controller_gains(PdControllerGains(p=p, d=d))

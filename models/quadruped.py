@@ -20,7 +20,7 @@ class Quadruped(ABC):
     """
 
     name: str  # name in Motion files
-    definition: str  # argument of models.robot_files.load_robot
+    definition: str  # argument of models.robots.load_robot
     joint_names: tuple[str, ...]  # names of the J joints
     joint_lower: Array  # lower position limits in rad, shape (J,)
     joint_upper: Array  # upper position limits in rad, shape (J,)

@@ -12,6 +12,8 @@ the frame at the centre of its toe's sphere, and the usual stance::
 """
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -24,8 +26,8 @@ from loco_drake.common.typed_yaml import read_yaml
 
 from .chains import ChainRobot
 from .legs import LEGS
-from .quadruped import Quadruped
-from .robots import ROBOTS, get_robot
+from .robot import ROBOTS
+from .simulation_file import SimulationFile
 from .urdf import LIMITS, LegFile, find_urdf, read_legs
 
 SUFFIXES = (".yaml", ".yml")
@@ -41,7 +43,7 @@ _MAX_TURN = 20.0  # rad; more must be degrees
 
 @dataclass(kw_only=True)
 class RobotFile:
-    """A robot to retarget to."""
+    """A robot to retarget to and, with three joints a leg, to simulate."""
 
     # By default that of the file.
     name: str = ""
@@ -54,27 +56,15 @@ class RobotFile:
     foot_radius: float = 0.0
     # By FL, FR, RL and RR.
     legs: dict[str, LegFile] = field(default_factory=dict)
+    # Folder of its own networks (tokenizer, generator, policy), relative to this file.
+    weights: str = ""
+    # What simulating it takes beyond the URDF.
+    simulation: SimulationFile = field(default_factory=SimulationFile)
 
 
 def is_robot_file(definition: str) -> bool:
     """Returns whether this is a path to a robot's YAML file, not a name."""
     return Path(definition).suffix in SUFFIXES
-
-
-def load_robot(definition: str) -> Quadruped:
-    """Returns the robot of that name, or the one in that YAML file.
-
-    Raises:
-        InputError: if there is no such robot, or the file or its URDF will not do.
-    """
-    if is_robot_file(definition):
-        return read_robot(Path(definition))
-    if definition not in ROBOTS:
-        raise InputError(
-            f"Unknown robot {definition!r}; the choices are {', '.join(ROBOTS)}, or "
-            "a robot's YAML file."
-        )
-    return get_robot(definition)
 
 
 def read_robot(path: Path) -> ChainRobot:
@@ -83,10 +73,28 @@ def read_robot(path: Path) -> ChainRobot:
     Raises:
         InputError: naming what is missing, unknown or impossible.
     """
+    file = read_file(path)
+    with named(path):
+        return chain_robot(file, path)
+
+
+def read_file(path: Path) -> RobotFile:
+    """Returns a YAML file that is complete and agrees with itself.
+
+    Raises:
+        InputError: naming what is missing or unknown.
+    """
     file = read_yaml(path, RobotFile, "a robot file")
-    try:
+    with named(path):
         _check(file)
-        return _make(file, path)
+    return file
+
+
+@contextmanager
+def named(path: Path) -> Iterator[None]:
+    """Begins messages of InputErrors within with the path of their file."""
+    try:
+        yield
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -132,7 +140,12 @@ def _check(file: RobotFile) -> None:
             raise InputError(f"speed of leg {name} must be above 0 rad/s.")
 
 
-def _make(file: RobotFile, path: Path) -> ChainRobot:
+def chain_robot(file: RobotFile, path: Path) -> ChainRobot:
+    """Returns the kinematics of a robot in the file at ``path``.
+
+    Raises:
+        InputError: if its URDF does not fit the file.
+    """
     legs = [file.legs[leg] for leg in LEGS]
     name = file.name or path.stem
     if name in ROBOTS:

@@ -1,7 +1,5 @@
-"""Go2 and A1: their models as numbers."""
+"""Robots by name or by file; Go2 and A1 are read here."""
 
-import re
-from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -14,161 +12,23 @@ from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import Context, DiagramBuilder
 
 from loco_drake.common.arrays import Array
-from loco_drake.common.errors import check_choice
+from loco_drake.common.errors import InputError, check_choice, quoted
 
 from .legs import LEGS
-from .meshes import convert_meshes
+from .own_robots import Setting, read_own_robot
+from .parsing import AddUrdf
+from .parsing import ConfigureParser as ConfigureParser
 from .quadruped import Quadruped
+from .robot import LEAST_PAYLOAD
+from .robot import ROBOTS as ROBOTS
+from .robot import Robot as Robot
+from .robot_files import is_robot_file, read_robot
 
-ROBOTS = ("go2", "a1")
 LEG_JOINTS = ("hip", "thigh", "calf")
 
 _MODELS = Path(__file__).parent
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Robot(Quadruped):
-    """A quadruped with three joints per leg, all read from its Drake model.
-
-    Every leg has a hip (about x, abduction), a thigh and a calf (both about y), in this
-    order. With the hip joint at p_BHip, the thigh joint at an offset ``d`` to its side,
-    links of length ``l1`` and ``l2`` that hang down at zero, and angles a, b, c,
-
-        p_BF = p_BHip + Rx(a) [-l1 sin b - l2 sin(b + c), d, -l1 cos b - l2 cos(b + c)]
-
-    from which the kinematics follow in closed form.
-    """
-
-    url: str  # the model, package://...; see ConfigureParser
-    effort_limits: Array  # at the joint, N m, shape (12,)
-    reflected_inertia: Array  # of the rotors at the joint, kg m^2, shape (12,)
-    # About each joint with the others locked in the standing pose, including reflected
-    # inertia, kg m^2, shape (12,).
-    joint_inertia: Array
-    kp: Array  # stiffness of the motors' PD, N m/rad, shape (12,)
-    # Damping of the motors' PD, N m s/rad, shape (12,). A plant's own is less, see
-    # models.plant.plant_damping.
-    kd: Array
-    mass: float  # of the whole robot, kg
-    # Y in m from the hip joint's axis to the thigh joint, positive on the left, shape
-    # (4,).
-    abduction_offset: Array
-    thigh_length: float  # thigh joint to calf joint, m
-    calf_length: float  # calf joint to the centre of the toe sphere, m
-    # What all joints can lose at once while the mass matrix stays positive definite in
-    # every pose, also with parameters.LEAST_PAYLOAD, kg m^2.
-    removable_inertia: float
-    trunk_size: Array  # of the trunk's collision box, centred at B, in m, shape (3,)
-
-    @property
-    def p_BV(self) -> Array:
-        """The thigh joints at zero abduction, m, shape (4, 3)."""
-        return self.p_BHip + self.abduction_offset[:, None] * np.array([0.0, 1.0, 0.0])
-
-    @property
-    def folded_length(self) -> float:
-        """Distance of the toe from the thigh joint with the calf at its limit, m."""
-        l1, l2 = self.thigh_length, self.calf_length
-        square = l1**2 + l2**2 + 2 * l1 * l2 * np.cos(self.joint_lower[2])
-        return float(np.sqrt(square))
-
-    def AddModel(self, parser: Parser) -> ModelInstanceIndex:
-        """Adds the model, without its meshes, to the parser's plant."""
-        return AddRobotModel(parser, self.name, visual=False)
-
-    def toe_positions(self, joints: Array) -> Array:
-        """Returns p_BF in m, shape (..., 4, 3)."""
-        return self._ends(joints, self.calf_length)
-
-    def knee_positions(self, joints: Array) -> Array:
-        """Returns the origins of the last joints in B, m, shape (..., 4, 3)."""
-        return self._ends(joints, 0.0)
-
-    def toe_jacobians(self, joints: Array) -> Array:
-        """Returns d p_BF / d joints, m/rad, shape (..., 4, 3, n)."""
-        a, b, c = _angles(joints)
-        x2 = -self.calf_length * np.sin(b + c)
-        z2 = -self.calf_length * np.cos(b + c)
-        x = -self.thigh_length * np.sin(b) + x2
-        z = -self.thigh_length * np.cos(b) + z2
-        sin_a, cos_a = np.sin(a), np.cos(a)
-        d = self.abduction_offset
-        J = np.zeros((*a.shape, 3, 3))
-        J[..., 1, 0] = -sin_a * d - cos_a * z
-        J[..., 2, 0] = cos_a * d - sin_a * z
-        # Turning about y by +db moves (x, z) by (z, -x) db.
-        J[..., 0, 1] = z
-        J[..., 1, 1] = sin_a * x
-        J[..., 2, 1] = -cos_a * x
-        J[..., 0, 2] = z2
-        J[..., 1, 2] = sin_a * x2
-        J[..., 2, 2] = -cos_a * x2
-        return J
-
-    def leg_joints(self, p_BF: Array) -> Array:
-        """Returns joints (..., 12) in rad that put the toes at ``p_BF`` (..., 4, 3).
-
-        Selects the solution with the foot below the hip's axis in the plane of the leg
-        and the knee bent backward (calf negative), as these robots are built. A target
-        out of the calf's range is clamped: the leg points at it with its largest or
-        smallest length. Hip and thigh are not clamped, but within (-pi, pi].
-        """
-        x, y, z = np.moveaxis(p_BF - self.p_BHip, -1, 0)
-        d, l1, l2 = self.abduction_offset, self.thigh_length, self.calf_length
-        # Within the plane of the leg the toe is at (x, height).
-        height = -np.sqrt(np.maximum(y * y + z * z - d * d, 0.0))
-        a = np.arctan2(z, y) - np.arctan2(height, d)
-        cos_c = (x * x + height * height - l1 * l1 - l2 * l2) / (2 * l1 * l2)
-        c = -np.arccos(np.minimum(np.maximum(cos_c, -1.0), 1.0))
-        c = np.minimum(np.maximum(c, self.joint_lower[2::3]), self.joint_upper[2::3])
-        b = np.arctan2(-x, -height) - np.arctan2(l2 * np.sin(c), l1 + l2 * np.cos(c))
-        joints = np.stack((_wrap(a), _wrap(b), c), axis=-1)
-        return joints.reshape(*joints.shape[:-2], 12)
-
-    def nearest_joints(self, p_BF: Array) -> Array:
-        """Returns :meth:`leg_joints` clipped to the joint limits."""
-        return np.clip(self.leg_joints(p_BF), self.joint_lower, self.joint_upper)
-
-    def reachable_toes(self, p_BF: Array) -> Array:
-        """Returns toe positions within the joint limits near ``p_BF``.
-
-        A toe that is nearer to its hip than the leg folds is moved down the trunk's z
-        axis. A leg that is too short points at its target.
-        """
-        x, y, z = np.moveaxis(p_BF - self.p_BHip, -1, 0)
-        # In the plane of the leg, whose distance from the hip's axis is the offset.
-        square = 1.001 * self.folded_length**2 + self.abduction_offset**2
-        drop = np.sqrt(np.maximum(square - x**2 - y**2, 0.0))
-        lowered = p_BF.copy()
-        lowered[..., 2] = np.minimum(p_BF[..., 2], self.p_BHip[:, 2] - drop)
-        folds = x**2 + y**2 + z**2 < square
-        goal = np.where(folds[..., None], lowered, p_BF)
-        return super().reachable_toes(goal)
-
-    def _ends(self, joints: Array, calf_length: float) -> Array:
-        """Returns points (..., 4, 3) in B at this distance below the calf joints."""
-        a, b, c = _angles(joints)
-        x = -self.thigh_length * np.sin(b) - calf_length * np.sin(b + c)
-        z = -self.thigh_length * np.cos(b) - calf_length * np.cos(b + c)
-        sin_a, cos_a = np.sin(a), np.cos(a)
-        d = self.abduction_offset
-        p_B = np.empty((*a.shape, 3))
-        p_B[..., 0] = x
-        p_B[..., 1] = cos_a * d - sin_a * z
-        p_B[..., 2] = sin_a * d + cos_a * z
-        p_B += self.p_BHip
-        return p_B
-
-
-def ConfigureParser(parser: Parser, *, visual: bool = True) -> None:
-    """Registers the packages in the models' URLs with ``parser``.
-
-    Those of the meshes are included if ``visual``; the first time this takes some
-    seconds, see :mod:`loco_drake.models.meshes`.
-    """
-    parser.package_map().AddPackageXml(str(_MODELS / "package.xml"))
-    if visual:
-        parser.package_map().AddPackageXml(str(convert_meshes() / "package.xml"))
+# Robots that were read from files in this process, by their names.
+_READ: dict[str, Robot] = {}
 
 
 def AddRobotModel(parser: Parser, name: str, *, visual: bool) -> ModelInstanceIndex:
@@ -179,24 +39,68 @@ def AddRobotModel(parser: Parser, name: str, *, visual: bool) -> ModelInstanceIn
     Raises:
         InputError: if there is no such robot.
     """
-    ConfigureParser(parser, visual=visual)
-    url = _url(name)
-    if visual:
-        (instance,) = parser.AddModels(url=url)
-        return instance
-    text = Path(parser.package_map().ResolveUrl(url)).read_text()
-    text = re.sub(r"<visual>.*?</visual>", "", text, flags=re.DOTALL)
-    (instance,) = parser.AddModelsFromString(file_contents=text, file_type="urdf")
-    return instance
+    return AddUrdf(parser, url=_url(name), visual=visual)
+
+
+def get_robot(definition: str) -> Robot:
+    """Returns a robot that can be simulated; its model is parsed once.
+
+    Args:
+        definition: one of :data:`ROBOTS`, a robot's YAML file, or the name of a robot
+            that this process has read from its file before.
+
+    Raises:
+        InputError: if there is no such robot, or the file or its URDF will not do.
+    """
+    if is_robot_file(definition):
+        robot, _ = _read_file(Path(definition).resolve())
+        _READ[robot.name] = robot
+        return robot
+    if definition in _READ:
+        return _READ[definition]
+    if definition not in ROBOTS:
+        raise InputError(
+            f"Unknown robot {quoted(definition)}; the choices are "
+            f"{', '.join(ROBOTS)}, or a robot's YAML file."
+        )
+    return _read_shipped(definition)
+
+
+def known_robot(name: str) -> Robot | None:
+    """Returns the robot of a name that :func:`get_robot` knows, or None."""
+    return get_robot(name) if name in (*ROBOTS, *_READ) else None
+
+
+def load_robot(definition: str) -> Quadruped:
+    """Returns a robot to retarget to: one of ROBOTS, or that in a YAML file.
+
+    In contrast to :func:`get_robot` it may have any legs, and neither masses nor
+    motors.
+
+    Raises:
+        InputError: if there is no such robot, or the file or its URDF will not do.
+    """
+    if is_robot_file(definition):
+        return read_robot(Path(definition))
+    return get_robot(definition)
+
+
+def robot_settings(path: Path) -> tuple[Setting, ...]:
+    """Returns what the robot in a YAML file is simulated with, each with its source.
+
+    Raises:
+        InputError: as :func:`get_robot`.
+    """
+    return _read_file(path.resolve())[1]
 
 
 @lru_cache
-def get_robot(name: str) -> Robot:
-    """Returns the robot ``name``; its model is parsed once.
+def _read_file(path: Path) -> tuple[Robot, tuple[Setting, ...]]:
+    return read_own_robot(path)
 
-    Raises:
-        InputError: if there is no such robot.
-    """
+
+@lru_cache
+def _read_shipped(name: str) -> Robot:
     url = _url(name)
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.01)
@@ -239,11 +143,16 @@ def get_robot(name: str) -> Robot:
         kp=np.array([gain.p for gain in gains]),
         kd=np.array([gain.d for gain in gains]),
         removable_inertia=extras["removable_inertia"],
+        least_payload=LEAST_PAYLOAD,
         mass=float(plant.CalcTotalMass(context)),
         p_BHip=p_BHip,
         abduction_offset=p_BThigh[:, 1] - p_BHip[:, 1],
         thigh_length=float(p_BThigh[0, 2] - p_BCalf[0, 2]),
         calf_length=float(p_BCalf[0, 2] - p_BF[0, 2]),
+        joint_signs=np.ones(len(names)),
+        joint_zeros=np.zeros(len(names)),
+        knee_signs=np.full(len(LEGS), -1.0),
+        knee_offset=np.zeros(len(LEGS)),
         foot_radius=foot_radius,
         trunk_size=np.array(shape_of("base", Box, centred=True).size()),
         stand_joints=stand_joints,
@@ -278,14 +187,3 @@ def _collision_shape(
     assert isinstance(shape, kind)
     assert not centred or inspector.GetPoseInFrame(geometry).IsExactlyIdentity()
     return shape
-
-
-def _angles(joints: Array) -> tuple[Array, Array, Array]:
-    """Returns the hips', thighs' and calves' angles, each of shape (..., 4)."""
-    return joints[..., 0::3], joints[..., 1::3], joints[..., 2::3]
-
-
-def _wrap(angle: Array) -> Array:
-    """Returns ``angle`` in rad, within (-pi, pi]; it must be within (-3 pi, 3 pi)."""
-    turns = (angle <= -np.pi).astype(np.float64) - (angle > np.pi)
-    return angle + 2 * np.pi * turns

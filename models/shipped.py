@@ -9,6 +9,11 @@ from loco_drake.common.errors import InputError
 if TYPE_CHECKING:
     from .robots import Robot
 
+_HOW_TO_TRAIN = (
+    " Train one with loco-drake train tracker, and give it with --policy, or name its "
+    "folder as weights in the robot's file."
+)
+
 
 def pretrained_dir() -> Path:
     """Returns the folder of the shipped weights."""
@@ -75,24 +80,53 @@ def policy_variants(robot: "Robot") -> dict[str, Path]:
     return {k.removeprefix(prefix): f for k, f in shipped if k.startswith(prefix)}
 
 
+def own_weights(robot: "Robot") -> dict[str, Path]:
+    """Returns the weights in the folder that a robot's file names, as weights_in.
+
+    Raises:
+        InputError: if there is no such folder, or it has several of a kind.
+    """
+    if robot.weights is None:
+        return {}
+    if not robot.weights.is_dir():
+        raise InputError(
+            f"{robot.definition} names the weights {str(robot.weights)!r}, but there "
+            "is no such folder."
+        )
+    return weights_in(robot.weights)
+
+
+def network_path(robot: "Robot", kind: str) -> Path:
+    """Returns a robot's weights of a kind, its own or the shipped "tokenizer", ...
+
+    Raises:
+        InputError: as :func:`own_weights`.
+    """
+    return own_weights(robot).get(kind, pretrained_path(kind))
+
+
 def policy_path(robot: "Robot", policy: Path | None = None) -> Path:
     """Returns the weights file of a policy.
 
     ``policy`` is a weights file, which is returned as it is, or the name of a shipped
-    variant, such as "randomized"; by default it is the robot's main policy.
+    variant, such as "randomized"; by default it is the robot's main policy: the shipped
+    one, or that in the folder that the robot's file names.
 
     Raises:
         InputError: if there is no such policy; names the existing ones.
     """
     if policy is None:
-        main = pretrained_path(f"policy_{robot.name}")
+        shipped = pretrained_path(f"policy_{robot.name}")
+        main = own_weights(robot).get("policy", shipped)
         if not main.is_file():
             from .robots import ROBOTS
 
-            shipped = [n for n in ROBOTS if pretrained_path(f"policy_{n}").is_file()]
+            present = [n for n in ROBOTS if pretrained_path(f"policy_{n}").is_file()]
             raise InputError(
                 f"There are no policy weights for {robot.name} yet; "
-                f"there are some for {', '.join(shipped) or 'no robot'}."
+                f"there are some for {', '.join(present) or 'no robot'}."
+                + _HOW_TO_TRAIN
+                * (robot.name not in ROBOTS)
             )
         return main
     if policy.name != str(policy) or policy.suffix or policy.exists():

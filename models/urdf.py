@@ -27,9 +27,10 @@ _FOOT_SHARE = 0.1
 LIMITS = ("lower", "upper", "speed")
 
 # What is left of a URDF: what moves, and how. So it needs no inertias and no meshes.
-_KEPT = {
+_KEPT: dict[str, set[str]] = {
     "robot": {"link", "joint", "frame"},
     "joint": {"parent", "child", "origin", "axis"},
+    "link": set(),
 }
 
 # Drake welds a link of this name to the world; many files begin with one that a joint
@@ -102,7 +103,7 @@ def read_legs(path: Path, trunk: str, legs: Sequence[LegFile]) -> UrdfLegs:
     """
     names = [name for leg in legs for name in leg.joints]
     feet = [leg.foot for leg in legs]
-    root = _read_xml(path)
+    root = read_xml(path)
     elements = {str(joint.get("name")): joint for joint in root.iterfind("joint")}
     limits = np.array(
         [_read_limits(elements[check_choice("joint", n, elements)]) for n in names]
@@ -112,7 +113,7 @@ def read_legs(path: Path, trunk: str, legs: Sequence[LegFile]) -> UrdfLegs:
             of_leg[:, k] = getattr(leg, key) or of_leg[:, k]
     lower, upper, speed = limits.T.copy()
     above = [_joints_above(root, foot) for foot in feet]
-    model = _strip(root, names)
+    model = strip_urdf(root, names)
     plant = MultibodyPlant(time_step=0.0)
     try:
         Parser(plant).AddModelsFromString(model, "urdf")
@@ -120,9 +121,7 @@ def read_legs(path: Path, trunk: str, legs: Sequence[LegFile]) -> UrdfLegs:
         # Drake passes over joints that have no links.
         moving: list[RevoluteJoint] = [plant.GetJointByName(name) for name in names]
     except (RuntimeError, ValueError) as error:
-        reason = re.sub(r"<literal-string>\S* error: ", "", str(error))
-        reason = " ".join(reason.split())[:300]
-        raise InputError(f"Drake cannot read {path.name}: {reason}") from None
+        raise unreadable(path, error) from None
     # Drake adds frames of its own, which nobody means.
     frames = [str(tag.get("name")) for tag in root if tag.tag in ("link", "frame")]
     check_choice("trunk", trunk, frames)
@@ -164,7 +163,15 @@ def read_legs(path: Path, trunk: str, legs: Sequence[LegFile]) -> UrdfLegs:
     )
 
 
-def _read_xml(path: Path) -> ET.Element:
+def unreadable(path: Path, error: Exception) -> InputError:
+    """Returns the error of a URDF that Drake refuses with ``error``."""
+    reason = re.sub(r"<literal-string>\S* error: ", "", str(error))
+    reason = " ".join(reason.split())[:300]
+    return InputError(f"Drake cannot read {path.name}: {reason}")
+
+
+def read_xml(path: Path) -> ET.Element:
+    """Returns the root of a URDF; raises InputError if the file is none."""
     if path.stat().st_size > _MAX_BYTES:
         raise InputError(f"{path} is not a URDF: it has more than 20 MB.")
     try:
@@ -238,11 +245,17 @@ def _end(joint: ET.Element, tag: str) -> str | None:
     return None if element is None else element.get("link")
 
 
-def _strip(root: ET.Element, joints: Sequence[str]) -> str:
-    """Returns ``root`` stripped to links and joints, of which only ``joints`` move."""
+def strip_urdf(
+    root: ET.Element, joints: Sequence[str], *, inertial: bool = False
+) -> str:
+    """Returns ``root`` stripped to links and joints, of which only ``joints`` move.
+
+    Links keep their inertia if ``inertial``. The element is changed.
+    """
+    kept = _KEPT | ({"link": {"inertial"}} if inertial else {})
     for element in [root, *root.iterfind("joint"), *root.iterfind("link")]:
         for child in list(element):
-            if child.tag not in _KEPT.get(element.tag, set()):
+            if child.tag not in kept[element.tag]:
                 element.remove(child)
     for element in root.iter():
         for key in ("name", "link"):

@@ -106,7 +106,9 @@ class ReferenceGenerator(PlanProducer):
         self._horizon = horizon
         self._config.check()
         own = self._config
-        self._model = model or motion_model_of(robot.name, own.tokenizer, own.generator)
+        self._model = model or motion_model_of(
+            robot.definition, own.tokenizer, own.generator
+        )
         # Whether the model learned from grounded motion only.
         self.grounded = self._model.grounded
         self._gait = self.DeclareVectorInputPort("gait", 1)

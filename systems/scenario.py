@@ -10,11 +10,11 @@ from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 from pydrake.systems.analysis import SimulatorConfig
 from pydrake.visualization import VisualizationConfig
 
-from loco_drake.common.errors import InputError, check_choice, check_number
+from loco_drake.common.errors import InputError, check_number
 from loco_drake.common.typed_yaml import refuse_repeated_keys
 from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD
 from loco_drake.models.plant import PlantConfig
-from loco_drake.models.robots import ROBOTS
+from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import ANY, gait_index, parse_schedule
 
 # Of a scenario's text: the loader recurses at each bracket, and copies at each alias.
@@ -145,7 +145,7 @@ class Disturbances:
 class Scenario:
     """Everything that defines a diagram and its simulator."""
 
-    robot: str = "go2"  # go2 or a1
+    robot: str = "go2"  # go2, a1, or a robot's YAML file
     plant: PlantConfig = field(default_factory=PlantConfig)
     reference: GeneratedReference | MotionReference | PlanReference = field(
         default_factory=GeneratedReference
@@ -169,7 +169,7 @@ class Scenario:
 
     def check(self) -> None:
         """Raises InputError unless every field is valid."""
-        check_choice("robot", self.robot, ROBOTS)
+        get_robot(self.robot)
         for part in (self.plant, self.reference, self.steering, self.smoother):
             if not isinstance(part, MotionReference | PlanReference | None):
                 part.check()

@@ -4,6 +4,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 SOLO8 = ROOT / "examples" / "solo8.yaml"
+# Those that can be simulated.
+OWN = {name: ROOT / "examples" / f"{name}.yaml" for name in ("b1", "anymal")}
 
 _DATA = "package://example-robot-data/robots"
 _LEGS = ("FL", "FR", "RL", "RR")

@@ -86,6 +86,12 @@ def test_retargeting_shows_the_robot_file_as_it_is():
     assert block == (ROOT / "examples" / "solo8.yaml").read_text()
 
 
+def test_own_robot_shows_the_robot_file_as_it_is():
+    page = (ROOT / "docs" / "own_robot.md").read_text()
+    (block,) = re.findall(r"^```yaml\n(.*?)^```$", page, re.M | re.S)
+    assert block == (ROOT / "examples" / "b1.yaml").read_text()
+
+
 def readme():
     return (ROOT / "README.md").read_text()
 

@@ -22,7 +22,7 @@ PAGES = {
     "quick_start": (4, "pace.html turn.json walk.html"),
     "driving": (2, "a.drive drive.html figures.json"),
     "own_clip": (5, "motions/change play.html bow.html bow.json"),
-    "own_robot": (2, "motions/solo8 solo8.html"),
+    "own_robot": (3, "b1.json motions/cat b1.html"),
     "fine_tune": (3, "runs/try/policy.safetensors cat.json"),
     "train": (4, "motions/try runs/try/policy.safetensors"),
     "deploy": (2, "policy.onnx plans.npz go2.xml"),

@@ -52,8 +52,8 @@ _DIFFERS = (
 class Drive:
     """Drive a robot: keys, sliders, buttons and a gamepad on Meshcat's page."""
 
-    # Robot: go2 or a1.
-    robot: Annotated[str | None, option(metavar="ROBOT", default="go2")] = None
+    # Robot: go2, a1, or a YAML file, see docs/own_robot.md.
+    robot: Annotated[str | None, option(metavar="ROBOT|FILE", default="go2")] = None
     gait: Annotated[
         str | None,
         option(
@@ -120,6 +120,7 @@ class Drive:
         scenario = self._read_scenario(recorded)
         table = self._read_table(scenario, recorded)
         header = _header(scenario, recorded)
+        robot = get_robot(header["robot"])
         duration = self._duration(table, recorded)
         meshcat = driver = None
         if self.meshcat or self.html is not None:
@@ -169,7 +170,7 @@ class Drive:
         def report() -> None:
             figures.update(
                 {
-                    "robot": header["robot"],
+                    "robot": robot.name,
                     "gait": header["gait"],
                     "seed": header["seed"],
                     "duration_s": simulated if duration is None else duration,
@@ -178,7 +179,7 @@ class Drive:
                     "interrupted": stop.is_set(),
                     "falls": driven.falls,
                     **tracking_metrics(rollout),
-                    **drive_scores(get_robot(header["robot"]), driven),
+                    **drive_scores(robot, driven),
                     "real_time_factor": simulated / driven.wall,
                     "wall_clock_s": elapsed,
                 }
@@ -317,15 +318,16 @@ def _header(scenario: "Scenario", recorded: "DriveFile | None") -> dict[str, Any
         InputError: if weights are not there, or not those of ``recorded``.
     """
     from loco_drake.models.robots import get_robot
-    from loco_drake.models.shipped import policy_path, pretrained_path
+    from loco_drake.models.shipped import network_path, policy_path
     from loco_drake.systems.scenario import DumpScenario
 
     policy: Any = scenario.policy
     reference: Any = scenario.reference
+    robot = get_robot(scenario.robot)
     paths = {
-        "policy": policy_path(get_robot(scenario.robot), policy.weights),
-        "tokenizer": reference.tokenizer or pretrained_path("tokenizer"),
-        "generator": reference.generator or pretrained_path("generator"),
+        "policy": policy_path(robot, policy.weights),
+        "tokenizer": reference.tokenizer or network_path(robot, "tokenizer"),
+        "generator": reference.generator or network_path(robot, "generator"),
     }
     hashes = {}
     for kind, path in paths.items():

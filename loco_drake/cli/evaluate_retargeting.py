@@ -15,7 +15,7 @@ from loco_drake.cli.output import (
     tracked,
     write_figure,
 )
-from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.errors import InputError
 
 if TYPE_CHECKING:
     from loco_drake.datasets.segments import Segment
@@ -32,7 +32,7 @@ class EvaluateRetargeting(Evaluation):
     """
 
     # Robot: go2, a1, all (both), or a YAML file that describes another robot.
-    robot: Annotated[str, option(metavar="ROBOT")] = "go2"
+    robot: Annotated[str, option(metavar="ROBOT|FILE")] = "go2"
     labels: Annotated[tuple[str, ...], some_labels("all in segments.csv")] = ()
     # Exchange left and right.
     mirror: bool = False
@@ -79,8 +79,7 @@ class EvaluateRetargeting(Evaluation):
         """Returns the figures of all robots by name."""
         from loco_drake.datasets.split import Split
         from loco_drake.evaluation.retargeting import score_segments, summarize
-        from loco_drake.models.robot_files import load_robot
-        from loco_drake.models.robots import ROBOTS
+        from loco_drake.models.robots import get_robot, load_robot
 
         every, segments = self._segments()
         split, variant = Split(every), self._variant
@@ -88,7 +87,7 @@ class EvaluateRetargeting(Evaluation):
         loaded = [load_robot(name) for name in names]
         if self.ground:
             for robot in loaded:
-                check_choice("robot to ground", robot.name, ROBOTS)
+                get_robot(robot.definition)
         for robot in loaded:
             start = time.perf_counter()
             scores = score_segments(segments, robot, self.executor, variant, split)
@@ -103,7 +102,7 @@ class EvaluateRetargeting(Evaluation):
         from loco_drake.evaluation.dataset_picture import library_figure
         from loco_drake.evaluation.library import read_library
         from loco_drake.evaluation.report.results import Figures
-        from loco_drake.models.robot_files import load_robot
+        from loco_drake.models.robots import load_robot
 
         if self.figures is None:
             return

@@ -56,7 +56,7 @@ class EvaluateRobustness(SimulatedEvaluation):
         trained = load_actor(weights, robot).config.labels
         labels = [str(parse_label(label)) for label in self.labels or trained]
         scenario = Scenario(
-            robot=name,
+            robot=robot.definition,
             reference=GeneratedReference(gait=labels[0], duration=DURATION),
             policy=TrainedPolicy(weights=weights),
         )

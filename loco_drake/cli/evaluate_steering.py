@@ -101,7 +101,7 @@ class EvaluateSteering(SimulatedEvaluation):
         )
 
         return Scenario(
-            robot=name,
+            robot=get_robot(name).definition,
             reference=GeneratedReference(gait=label, duration=60.0),
             steering=SteeringConfig(measured_ranges=False),
             policy=TrainedPolicy(weights=policy_path(get_robot(name), self.policy)),

@@ -130,7 +130,7 @@ class EvaluateTracking(SimulatedEvaluation):
         plant.check()
         plant_damping(robot, plant)
         policy = systems.TrainedPolicy(weights=weights)
-        scenario = systems.Scenario(robot=name, plant=plant, policy=policy)
+        scenario = systems.Scenario(robot=robot.definition, plant=plant, policy=policy)
         if self.reference != "generated":
             ground = self.reference == "grounded"
             scenario.reference = systems.PlanReference()

@@ -30,8 +30,8 @@ class Evaluation(WorkerOptions):
 
     KEYS: ClassVar[tuple[str, ...]]
 
-    # Robot: go2, a1 or all.
-    robot: Annotated[str, option(metavar="ROBOT")] = "go2"
+    # Robot: go2, a1, all, or a YAML file, see docs/own_robot.md.
+    robot: Annotated[str, option(metavar="ROBOT|FILE")] = "go2"
     labels: Annotated[tuple[str, ...], some_labels("all with recordings")] = ()
     data_dir: DataDir = None
     # Number of seeds, counted up from --seed: accepted by every evaluation; this one is
@@ -69,8 +69,13 @@ class Evaluation(WorkerOptions):
 
     def robots(self) -> list[str]:
         """Returns the names of the robots; raises InputError if they are unknown."""
-        from loco_drake.models.robots import ROBOTS
+        from loco_drake.models.robot_files import is_robot_file
+        from loco_drake.models.robots import ROBOTS, get_robot
 
+        if is_robot_file(self.robot):
+            # From here on its name stands for it.
+            self.robot = get_robot(self.robot).name
+            return [self.robot]
         check_choice("robot", self.robot, (*ROBOTS, "all"))
         return list(ROBOTS) if self.robot == "all" else [self.robot]
 

@@ -126,7 +126,7 @@ class Export:
         reference = GeneratedReference(
             gait=self.gait, seed=self.seed, duration=self.duration
         )
-        scenario = Scenario(robot=robot.name, reference=reference)
+        scenario = Scenario(robot=robot.definition, reference=reference)
         plan = PlanRecorder(scenario).record(self.duration)
         save_plan(robot, plan, self.duration, path)
         rows = [

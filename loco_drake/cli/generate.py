@@ -17,7 +17,7 @@ from loco_drake.cli.options import (
     option,
 )
 from loco_drake.cli.output import do_all, print_table, tracked, write_json
-from loco_drake.common.errors import check_at_least, check_choice
+from loco_drake.common.errors import check_at_least
 from loco_drake.motion.gaits import parse_schedule
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.motion_file import write_motion
@@ -65,7 +65,7 @@ class Generate(WorkerOptions):
         """Writes the files and prints the figures; returns 0."""
         from loco_drake.control.motion_batches import BatchMaker, Order, batches
         from loco_drake.generation import generate
-        from loco_drake.models.robots import ROBOTS
+        from loco_drake.models.robots import get_robot
         from loco_drake.models.shipped import chosen_weights
 
         schedule = parse_schedule(self.gait)
@@ -74,7 +74,7 @@ class Generate(WorkerOptions):
         generate.check_sampling(self.temperature, self.top_p, self.pace)
         if self.tell is not None:
             generate.check_velocity(self.tell)
-        check_choice("robot", self.robot, ROBOTS)
+        get_robot(self.robot)
         executor = self.executor
         check_at_least("count", self.count, 1)
         check_at_least("seed", self.seed, 0)

@@ -26,6 +26,7 @@ _COMMANDS = {
     "data list": "list the sources of motion and their licences",
     "data fetch": "download and check the recordings",
     "data inspect": "plot one stretch of a recording",
+    "robot inspect": "check a robot's file, and list what it is simulated with",
     "train tokenizer": "train the VQ-VAE that encodes motion",
     "train generator": "train the GPT that generates tokens",
     "train tracker": "train the tracking policy with PPO",

@@ -81,7 +81,12 @@ def some_labels(default: str) -> Any:
 TrainedLabels = Annotated[
     tuple[str, ...], some_labels("those that the policy was trained on")
 ]
-Robot = Annotated[str, option("Robot: go2 or a1.", metavar="ROBOT")]
+Robot = Annotated[
+    str,
+    option(
+        "Robot: go2, a1, or a YAML file, see docs/own_robot.md.", metavar="ROBOT|FILE"
+    ),
+]
 Workers = Annotated[int, option("Number of worker processes.")]
 Json = Annotated[
     Path | None,

@@ -50,7 +50,7 @@ class Play:
     # Robot: the YAML file of one that motion is of, such as examples/solo8.yaml; may be
     # repeated. go2 and a1 are known.
     robot: Annotated[
-        tuple[str, ...], tyro.conf.UseAppendAction, option(metavar="ROBOT")
+        tuple[str, ...], tyro.conf.UseAppendAction, option(metavar="ROBOT|FILE")
     ] = ()
     # Show all files at the same time.
     side_by_side: bool = False
@@ -132,8 +132,7 @@ class Play:
         return takes, rows
 
     def _robots(self) -> "dict[str, Quadruped]":
-        from loco_drake.models.robot_files import load_robot
-        from loco_drake.models.robots import ROBOTS
+        from loco_drake.models.robots import ROBOTS, load_robot
 
         robots = [load_robot(definition) for definition in (*ROBOTS, *self.robot)]
         return {robot.name: robot for robot in robots}

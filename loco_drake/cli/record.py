@@ -9,7 +9,6 @@ from loco_drake.cli.options import Json, Motions, OutFolder, Policy, Robot
 from loco_drake.common.errors import (
     check_at_least,
     check_bounds,
-    check_choice,
 )
 
 if TYPE_CHECKING:
@@ -49,13 +48,12 @@ class Record:
         """Writes the files and prints the table; returns 0, or 1 if there are none."""
         from loco_drake.common.determinism import single_thread
         from loco_drake.control.actor import load_actor
-        from loco_drake.models.robots import ROBOTS, get_robot
+        from loco_drake.models.robots import get_robot
         from loco_drake.models.shipped import policy_path
         from loco_drake.motion.motion import FPS
         from loco_drake.retargeting.inverse_kinematics import LegSolver
         from loco_drake.tracking.references import read_motions
 
-        check_choice("robot", self.robot, ROBOTS)
         check_at_least("attempts", self.attempts, 1)
         check_at_least("seed", self.seed, 0)
         check_bounds("--least-return", self.least_return, 0, 100)

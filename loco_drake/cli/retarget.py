@@ -21,7 +21,7 @@ from loco_drake.cli.options import (
     option,
 )
 from loco_drake.cli.output import MARK, print_table
-from loco_drake.common.errors import InputError, check_at_least, check_choice
+from loco_drake.common.errors import InputError, check_at_least
 from loco_drake.motion.gaits import LABELS
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Retarget(WorkerOptions):
     ] = ()
     # Robot: go2, a1, or a YAML file that describes another robot, such as
     # examples/solo8.yaml; see docs/retargeting.md.
-    robot: Annotated[str, option(metavar="ROBOT")] = "go2"
+    robot: Annotated[str, option(metavar="ROBOT|FILE")] = "go2"
     start: Start = None
     end: End = None
     fps: Fps = None
@@ -75,7 +75,7 @@ class Retarget(WorkerOptions):
     froude: bool = False
     # Make motion obey physics: move the trunk, by some mm and degrees, so that the
     # feet's forces can explain its motion. In flight it falls, on the ground friction
-    # suffices. For go2 and a1.
+    # suffices. For robots that can be simulated.
     ground: bool = False
     # Folder to write to: the Motion files.
     out: Annotated[
@@ -107,8 +107,7 @@ class Retarget(WorkerOptions):
         It is 1 if a clip failed, or is outside its bounds with --strict, else 0.
         """
         from loco_drake.datasets.skeleton import load_source
-        from loco_drake.models.robot_files import load_robot
-        from loco_drake.models.robots import ROBOTS
+        from loco_drake.models.robots import get_robot, load_robot
         from loco_drake.retargeting.retarget import retarget_segments
         from loco_drake.retargeting.scaling import Variant
 
@@ -116,10 +115,8 @@ class Retarget(WorkerOptions):
         check_at_least("trajectories", self.trajectories, 0)
         executor = self.executor
         check_at_least("steered", self.steer, 0)
-        if self.steer:
-            check_choice("robot to steer", robot.name, ROBOTS)
-        if self.ground:
-            check_choice("robot to ground", robot.name, ROBOTS)
+        if self.steer or self.ground:
+            get_robot(self.robot)  # the file may be of one that is only retargeted to
         source = None if self.source is None else load_source(self.source)
         segments, split = self._segments(source)
         variant = Variant(mirror=self.mirror, froude=self.froude, ground=self.ground)
@@ -131,7 +128,7 @@ class Retarget(WorkerOptions):
         # A disk that is full by then keeps nothing from being told of what was done.
         output.do_all(
             lambda: outcomes.extend(output.tracked(done, "Retargeting", len(segments))),
-            lambda: statuses.append(self._tell(robot.name, out, outcomes, split)),
+            lambda: statuses.append(self._tell(robot.definition, out, outcomes, split)),
         )
         return statuses[0]
 

@@ -36,6 +36,7 @@ from loco_drake.motion.motion_file import load_motion
 
 if TYPE_CHECKING:
     from loco_drake.evaluation.tracking import Rollout
+    from loco_drake.models.robots import Robot
     from loco_drake.systems.scenario import Scenario
     from loco_drake.viewing.takes import Scene
 
@@ -47,8 +48,8 @@ _GENERATED = ("generated", "gpt")  # the latter formerly
 class Simulate:
     """Simulate a robot in Drake that tracks generated motion or a Motion file."""
 
-    # Robot: go2 or a1.
-    robot: Annotated[str | None, option(metavar="ROBOT", default="go2")] = None
+    # Robot: go2, a1, or a YAML file, see docs/own_robot.md.
+    robot: Annotated[str | None, option(metavar="ROBOT|FILE", default="go2")] = None
     gait: Annotated[
         str | None,
         option(
@@ -107,9 +108,11 @@ class Simulate:
         from loco_drake.control.plan import PLAN_DT
         from loco_drake.control.state import POSITION
         from loco_drake.evaluation import tracking
+        from loco_drake.models.robots import get_robot
         from loco_drake.models.scenery import frame, publish_replay
 
         scenario, duration, motion = self._read()
+        robot = get_robot(scenario.robot)
         if self.video is not None:
             prepare_video(self.video, duration)
         meshcat = None
@@ -145,7 +148,7 @@ class Simulate:
         simulated = (len(rollout.state) - 1) * PLAN_DT
         reference: Any = scenario.reference
         figures = {
-            "robot": scenario.robot,
+            "robot": robot.name,
             "gait": reference.gait if motion is None else str(motion.label),
             "seed": reference.seed if motion is None else self.seed or 0,
             "duration_s": duration,
@@ -172,7 +175,7 @@ class Simulate:
 
         def save_video() -> None:
             if self.video is not None:
-                make_video(self.video, [_scene(scenario.robot, rollout)])
+                make_video(self.video, [_scene(robot, rollout)])
 
         done = (
             f"Stopped after {simulated:g} of {duration:g} s; the figures are of these."
@@ -195,6 +198,7 @@ class Simulate:
             InputError: if an option or a field of the scenario is amiss.
         """
         from loco_drake.control.driving import check_command
+        from loco_drake.models.robots import get_robot
         from loco_drake.systems.scenario import (
             GeneratedReference,
             LoadScenario,
@@ -257,23 +261,21 @@ class Simulate:
                 "file: add --reference generated."
             )
         motion = load_motion(reference.path)
-        if motion.robot != scenario.robot:
+        name = get_robot(scenario.robot).name
+        if motion.robot != name:
             raise InputError(
-                f"{reference.path} is a motion of {motion.robot}, not of "
-                f"{scenario.robot}."
+                f"{reference.path} is a motion of {motion.robot}, not of {name}."
             )
         return scenario, min(duration, motion.duration), motion
 
 
-def _scene(robot: str, rollout: "Rollout") -> "Scene":
+def _scene(robot: "Robot", rollout: "Rollout") -> "Scene":
     """Returns what a robot did, with its plan's keypoints."""
     from loco_drake.control.state import split
-    from loco_drake.models.robots import get_robot
     from loco_drake.motion.motion import FPS
     from loco_drake.systems.keypoint_visualizer import keypoints
     from loco_drake.viewing.takes import Scene, Take
 
-    model = get_robot(robot)
     q, _ = split(rollout.state)
     plan_q, _ = split(rollout.plan_state)
-    return Scene((Take(robot, model, FPS, q, keypoints(model, plan_q)),))
+    return Scene((Take(robot.name, robot, FPS, q, keypoints(robot, plan_q)),))

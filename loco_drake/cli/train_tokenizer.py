@@ -2,15 +2,18 @@
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from loco_drake.cli.options import MotionFolders, OutFolder
+from loco_drake.cli.options import MotionFolders, OutFolder, option
 from loco_drake.cli.training import Learned, NetworkTraining, Scores
 
 
 @dataclass(kw_only=True)
 class TrainTokenizer(NetworkTraining):
     """Train the VQ-VAE that encodes motion as tokens and decodes it.
+
+    With --add-to, teaches a tokenizer robots that it does not know yet: its codes, and
+    the robots that it knows, stay as they are, and so does its generator.
 
     Ctrl-C saves a checkpoint and stops; --resume continues.
     """
@@ -19,6 +22,9 @@ class TrainTokenizer(NetworkTraining):
     # Folder of Motion files: written by `retarget`, one for each robot; motions of the
     # validation set are held out for testing.
     motions: MotionFolders = (Path("motions/go2"),)
+    # Tokenizer to add to: it learns the robots of the motions that it does not know,
+    # and nothing else; shipped, or a file of weights.
+    add_to: Annotated[Path | None, option(metavar="NAME|FILE")] = None
     # Folder to write to: tokenizer.safetensors, the checkpoint and logs.
     out: OutFolder = Path("runs/tokenizer")
     # Number of training steps: the optimizer's, including those before --resume.
@@ -30,12 +36,19 @@ class TrainTokenizer(NetworkTraining):
         """Trains a tokenizer for the robots of the motions."""
         from loco_drake.generation.tokenizer import TokenizerConfig
         from loco_drake.generation.tokenizer_score import codebook_use, score_tokenizer
+        from loco_drake.generation.train_bodies import train_bodies
         from loco_drake.generation.train_tokenizer import train_tokenizer
         from loco_drake.generation.training_motions import load_library
+        from loco_drake.models.shipped import pretrained_path
 
         library = load_library(*self.motions)
-        config = TokenizerConfig(robots=library.robots)
-        tokenizer, result = train_tokenizer(library, config, self)
+        if self.add_to is None:
+            config = TokenizerConfig(robots=library.robots)
+            tokenizer, result = train_tokenizer(library, config, self)
+        else:
+            shipped = str(self.add_to) == "shipped"
+            base = pretrained_path("tokenizer") if shipped else self.add_to
+            tokenizer, result = train_bodies(library, base, self)
 
         def score() -> Scores:
             used = codebook_use(tokenizer, library.train + library.held_out)

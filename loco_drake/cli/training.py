@@ -3,9 +3,11 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from statistics import fmean
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
-from loco_drake.cli.options import Device, Json
+import tyro
+
+from loco_drake.cli.options import Device, Json, option
 from loco_drake.cli.output import do_all, print_table, say, write_json, write_results
 from loco_drake.cli.parsing import parse
 from loco_drake.common.errors import InputError
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
 # Options that are not the run's: where it is, and what a call does.
 _OF_THE_CALL = ("out", "resume", "json", "start_from")
 # Where it learned from may be elsewhere now: what is there is compared.
-_FOLDERS = ("motions", "references", "tokenizer", "tell")
+_FOLDERS = ("motions", "references", "tokenizer", "tell", "add_to", "robot")
 
 
 class Scores(NamedTuple):
@@ -48,15 +50,23 @@ class NetworkTraining(LoopSettings):
 
     NAME: ClassVar[str]
     device: Device = "cpu"
+    # Robot: the YAML file of one that motion is of, see docs/own_robot.md; may be
+    # repeated. go2 and a1 are known.
+    robot: Annotated[
+        tuple[str, ...], tyro.conf.UseAppendAction, option(metavar="ROBOT|FILE")
+    ] = ()
     json: Json = None
 
     def run(self) -> int:
         """Trains, prints and writes; returns 1 if it was stopped early, else 0."""
         from loco_drake.common.device import find_device
         from loco_drake.common.run_folder import check_folder
+        from loco_drake.models.robots import get_robot
 
         self.check()
         find_device(self.device)
+        for definition in self.robot:
+            get_robot(definition)
         weights = self.out / f"{self.NAME}.safetensors"
         check_folder(self.out, weights.name, self.resume)
         result, score = self.learn()

@@ -24,7 +24,7 @@ from loco_drake.control.state import (
     split,
 )
 from loco_drake.control.terrain import Terrain
-from loco_drake.models.parameters import LEAST_PAYLOAD
+from loco_drake.models.robot import LEAST_PAYLOAD
 
 MAX_LATENCY = 0.1  # s
 # Name and size of each part of a sensor error, in order.

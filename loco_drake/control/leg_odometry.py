@@ -16,18 +16,21 @@ class LegOdometry(nn.Module):
     """
 
     standing: Tensor
+    signs: Tensor
     p_BHip: Tensor
     offset: Tensor
 
     def __init__(self, robot: Robot) -> None:
         super().__init__()
         for name, array in (
-            ("standing", robot.stand_joints),
+            ("standing", robot.leg_angles(robot.stand_joints)),
+            ("signs", robot.joint_signs),
             ("p_BHip", robot.p_BHip),
             ("offset", robot.abduction_offset),
         ):
             value = torch.tensor(array, dtype=torch.float32)
             self.register_buffer(name, value, persistent=False)
+        self._turned = not robot.hangs_at_zero
         self._lengths = robot.thigh_length, robot.calf_length
 
     def forward(
@@ -45,6 +48,8 @@ class LegOdometry(nn.Module):
             v_WB_H in m/s, shape (..., 4, 3), and height above the toe's centre in m,
             shape (..., 4).
         """
+        if self._turned:
+            joints, speeds = self.signs * joints, self.signs * speeds
         legs = (*joints.shape[:-1], len(LEGS), 3)
         a, b, c = (joints + self.standing).reshape(legs).unbind(-1)
         da, db, dc = speeds.reshape(legs).unbind(-1)

@@ -44,8 +44,7 @@ from loco_drake.evaluation.library import (
 from loco_drake.evaluation.motion_scores import median
 from loco_drake.evaluation.samples import labels_of
 from loco_drake.models.quadruped import Quadruped
-from loco_drake.models.robot_files import load_robot
-from loco_drake.models.robots import ROBOTS
+from loco_drake.models.robots import ROBOTS, load_robot
 from loco_drake.motion.gait_timing import (
     GaitTiming,
     Track,

@@ -27,7 +27,9 @@ VELOCITY = slice(0, 2)  # v_WB along x and y of H, in stand heights per second
 YAW_RATE = slice(2, 3)  # rad/s
 HEIGHT = slice(3, 4)  # of the trunk frame over the ground, in stand heights
 ROLL_PITCH = slice(4, 6)  # rad
-JOINTS = slice(6, 18)  # rad, in the order of robot.joint_names
+# Robot.backward_angles, rad, in the order of robot.joint_names; of Go2 and A1 they are
+# the joints.
+JOINTS = slice(6, 18)
 CONTACTS = slice(18, 22)  # 1 on the ground, 0 in the air; FL, FR, RL, RR
 SIZE = 22
 
@@ -54,7 +56,7 @@ def motion_features(robot: Robot, motion: Motion) -> Array:
     features[0, :3] = features[1, :3]
     features[:, HEIGHT] = motion.base_position[:, 2:] / robot.stand_height
     features[:, ROLL_PITCH] = _roll_pitch(motion.base_quaternion, yaw)
-    features[:, JOINTS] = motion.joint_positions
+    features[:, JOINTS] = robot.backward_angles(motion.joint_positions)
     features[:, CONTACTS] = motion.contacts
     return features
 
@@ -71,7 +73,8 @@ def positions(robot: Robot, features: Array, path: Array) -> Array:
     q_HB = quat_multiply(q_pitch, q_roll)
     q_WB = quat_multiply(yaw_quat(path[..., 2]), q_HB)
     height = features[..., HEIGHT] * robot.stand_height
-    return np.concatenate((q_WB, path[..., :2], height, features[..., JOINTS]), axis=-1)
+    joints = robot.joints_of_backward(features[..., JOINTS])
+    return np.concatenate((q_WB, path[..., :2], height, joints), axis=-1)
 
 
 def _roll_pitch(q_WB: Array, yaw: Array) -> Array:

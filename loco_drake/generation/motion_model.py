@@ -19,8 +19,8 @@ from loco_drake.generation.generator import Generator, duration_bin, load_genera
 from loco_drake.generation.speed_rank import drawn_rank, rank_bin
 from loco_drake.generation.telling import is_told
 from loco_drake.generation.tokenizer import Tokenizer, load_tokenizer
-from loco_drake.models.robots import Robot, get_robot
-from loco_drake.models.shipped import pretrained_path
+from loco_drake.models.robots import ROBOTS, Robot, get_robot
+from loco_drake.models.shipped import network_path
 from loco_drake.motion.gaits import LABELS, ROW_LABELS
 from loco_drake.motion.motion import FPS
 
@@ -28,6 +28,10 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 CHUNK_SECONDS = 1.0
+_LEARN_BODY = (
+    " Let a tokenizer learn its body with loco-drake train tokenizer --add-to, see "
+    "docs/own_robot.md."
+)
 SETTLING = 4  # frames before the first one, in which feet reach the ground
 
 
@@ -79,16 +83,19 @@ class MotionModel:
     """
 
     def __init__(self, tokenizer: Tokenizer, generator: Generator, robot: str) -> None:
+        made = get_robot(robot)
         if generator.config.tokenizer != tokenizer.fingerprint:
             raise InputError(
                 f"The generator's weights are for the tokenizer "
                 f"{generator.config.tokenizer}, not for {tokenizer.fingerprint}; "
                 f"train the generator again after the tokenizer."
             )
-        if robot not in tokenizer.config.robots:
+        if made.name not in tokenizer.config.robots:
             raise InputError(
-                f"The tokenizer's weights are not for the robot {robot!r}; "
+                f"The tokenizer's weights are not for the robot {made.name!r}; "
                 f"there are weights for {', '.join(tokenizer.config.robots)}."
+                + _LEARN_BODY
+                * (made.name not in ROBOTS)
             )
         self.tokenizer = tokenizer.eval()
         self.generator = generator.eval()
@@ -96,7 +103,7 @@ class MotionModel:
         # change a code or a contact.
         self._writer = deepcopy(self.generator).double()
         self._decoder = deepcopy(self.tokenizer).double()
-        self.robot: Robot = get_robot(robot)
+        self.robot: Robot = made
         # Whether it learned from grounded motion only.
         self.grounded = generator.config.grounded
         self.frames_per_token = tokenizer.config.frames_per_token
@@ -105,7 +112,7 @@ class MotionModel:
         # Tokens at the beginning of a stream that only give context.
         settling = math.ceil(SETTLING / self.frames_per_token)
         self.lead = max(tokenizer.memory, settling)
-        self._robot_index = tokenizer.config.robots.index(robot)
+        self._robot_index = tokenizer.config.robots.index(made.name)
         known = generator.config.labels
         self._known = {i for i, label in enumerate(LABELS) if str(label) in known}
 
@@ -320,20 +327,24 @@ def motion_model_of(
     """
     if tokenizer is generator is None:
         return pretrained_motion_model(robot)
+    made = get_robot(robot)
     return load_motion_model(
-        tokenizer or pretrained_path("tokenizer"),
-        generator or pretrained_path("generator"),
+        tokenizer or network_path(made, "tokenizer"),
+        generator or network_path(made, "generator"),
         robot,
     )
 
 
 @lru_cache
 def pretrained_motion_model(robot: str) -> MotionModel:
-    """Returns the shipped motion model for ``robot``, loaded once.
+    """Returns the motion model for ``robot``, loaded once.
+
+    It is the shipped one, or that in the folder that the robot's file names.
 
     Raises:
         InputError: if there are no weights for that robot.
     """
+    made = get_robot(robot)
     return load_motion_model(
-        pretrained_path("tokenizer"), pretrained_path("generator"), robot
+        network_path(made, "tokenizer"), network_path(made, "generator"), robot
     )

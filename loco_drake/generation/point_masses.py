@@ -7,6 +7,7 @@ angular velocities.
 """
 
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 import torch
@@ -24,6 +25,7 @@ from loco_drake.motion.motion import FPS
 # Alternate corners of a box, (4, 3).
 _CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 _POINTS = len(_CORNERS)  # of a body
+_ROUNDING = 1e-9  # m
 REGULARIZATION = 0.1  # of the forces in PointMasses.unexplained
 _DOWN = (0.0, 0.0, 1.0)
 
@@ -44,6 +46,9 @@ class PointMasses:
         self._hips = table([r.p_BHip for r in robots])
         self._offset = table([r.abduction_offset for r in robots])
         self._thigh = table([np.array(r.thigh_length) for r in robots])
+        self._calf = table([np.array(r.calf_length) for r in robots])
+        forward = np.array([r.knee_signs > 0 for r in robots])
+        self._forward = torch.tensor(forward, device=device)
         self._height = table([np.array(r.stand_height) for r in robots])
         # Of the feet, in standing heights.
         radii = [np.array([r.foot_radius / r.stand_height]) for r in robots]
@@ -65,6 +70,8 @@ class PointMasses:
         """Returns the points as :meth:`.Toes.positions` does toes, (B, T, 52, 3)."""
         joints = features[..., ft.JOINTS]
         hip, thigh, calf = joints.reshape(*joints.shape[:-1], 4, 3).unbind(-1)
+        if self._forward.any():
+            thigh, calf = self._turn_knees(thigh, calf, robot)
         zero = torch.zeros_like(hip)
         # Origins of the frames in the frame of the hip, which turns about x.
         p_thigh = torch.stack((zero, zero + self._offset[robot][:, None], zero), dim=-1)
@@ -89,6 +96,15 @@ class PointMasses:
             (torch.zeros_like(height), torch.zeros_like(height), height), -1
         )
         return points + lift[:, :, None]
+
+    def _turn_knees(
+        self, thigh: Tensor, calf: Tensor, robot: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Returns the legs as they are of those whose knees point forward."""
+        l1, l2 = self._thigh[robot, None, None], self._calf[robot, None, None]
+        turned = thigh + 2 * torch.atan2(l2 * calf.sin(), l1 + l2 * calf.cos())
+        forward = self._forward[robot][:, None]
+        return torch.where(forward, turned, thigh), torch.where(forward, -calf, calf)
 
     def wrench(self, features: Tensor, robot: Tensor) -> Tensor:
         """Returns [L' / (m g h), c'' / g] at the frames 1 to T - 2, (B, T - 2, 6).
@@ -178,17 +194,23 @@ def _bodies(robot: Robot) -> tuple[Array, Array]:
     """Returns the points of trunk and links in their frames, and masses.
 
     The links are in the order of the joints: points (13, 4, 3) in m, masses (13,).
-    Whatever is welded to a link, such as a foot, is part of it.
+    Whatever is welded to a link, such as a foot, is part of it. A link's frame is that
+    of a leg that hangs down straight, in the plane of the toe, axes along those of B.
     """
     plant = MultibodyPlant(time_step=0.0)
     model = robot.AddModel(Parser(plant))
     plant.Finalize()
     context = plant.CreateDefaultContext()
+    straight = -robot.joint_signs * robot.joint_zeros
+    plant.SetPositions(context, model, [1.0, *[0.0] * 6, *straight])
+    down = robot.thigh_length * np.array([0.0, 0.0, 1.0])
+    legs = zip(robot.p_BHip, robot.p_BV, robot.p_BV - down, strict=True)
+    origins = [np.zeros(3), *chain.from_iterable(legs)]
     frames = [plant.GetUniqueFloatingBaseBodyOrThrow(model).body_frame()] + [
         plant.GetJointByName(name, model).frame_on_child() for name in robot.joint_names
     ]
     points, masses = [], []
-    for frame in frames:
+    for frame, origin in zip(frames, origins, strict=True):
         welded = plant.GetBodiesWeldedTo(frame.body())
         inertia = plant.CalcSpatialInertia(
             context, frame, [body.index() for body in welded]
@@ -198,6 +220,10 @@ def _bodies(robot: Robot) -> tuple[Array, Array]:
         unit = inertia.Shift(centre).CalcRotationalInertia().CopyToFullMatrix3()
         moments, axes = np.linalg.eigh(unit)
         second = np.maximum(moments.sum() / 2 - moments, 0.0)
-        points.append(centre + _CORNERS * np.sqrt(second / mass) @ axes.T)
+        corners = centre + _CORNERS * np.sqrt(second / mass) @ axes.T
+        X_BL = frame.CalcPoseInWorld(context)
+        shift = X_BL.translation() - origin
+        shift[np.abs(shift) < _ROUNDING] = 0.0
+        points.append(corners @ X_BL.rotation().matrix().T + shift)
         masses.append(mass)
     return np.array(points), np.array(masses)

@@ -6,7 +6,7 @@ because the quantization library takes seconds to import.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import ClassVar
@@ -34,6 +34,13 @@ class TokenizerConfig:
     code_size: int = 48  # dimension of a code
     codebooks: int = 12  # residual codebooks; a token is one code of each
     codebook_size: int = 128  # codes in a codebook
+    # Those of ``robots``, the last ones, that were added after the training: codes mean
+    # the same as before. The fingerprint does not depend on them.
+    added: tuple[str, ...] = field(default=(), repr=False)
+
+
+# Weights that have a row for each robot.
+BODY_ROWS = ("decoder_robot.weight", "encoder_robot.weight")
 
 
 class CausalConv(nn.Module):
@@ -170,10 +177,18 @@ class Tokenizer(nn.Module):
 
     @property
     def fingerprint(self) -> str:
-        """Hash of these weights in 16 bits, as they are shipped."""
+        """Hash of these weights in 16 bits, as they are shipped.
+
+        It says what codes mean, to which robots that were added later make no
+        difference.
+        """
+        first = len(self.config.robots) - len(self.config.added)
+        config = replace(self.config, robots=self.config.robots[:first])
         # With the field names of the first weights.
-        digest = sha256(repr(self.config).replace("codebook", "book").encode())
+        digest = sha256(repr(config).replace("codebook", "book").encode())
         for name, value in sorted(self.state_dict().items()):
+            if name in BODY_ROWS:
+                value = value[:first]
             data = value.half() if value.is_floating_point() else value
             digest.update(name.encode() + data.contiguous().numpy().tobytes())
         return digest.hexdigest()[:16]

@@ -6,7 +6,7 @@ so that the decoder can use the coarse ones alone.
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -183,7 +183,7 @@ def train_tokenizer(
 
 
 def tokenizer_losses(
-    learning: LearningTokenizer,
+    learning: Callable[[Tensor, Tensor, Tensor], tuple[Tensor, Tensor]],
     toes: Toes,
     masses: PointMasses,
     scales: tuple[Tensor, Tensor, Tensor],
@@ -193,7 +193,8 @@ def tokenizer_losses(
     """Returns the losses of a batch, unweighted; see :data:`WEIGHTS`.
 
     Args:
-        learning: in training mode its codebooks are updated.
+        learning: returns reconstructions and the commitment loss, see
+            :class:`LearningTokenizer`, whose codebooks are updated in training mode.
         toes: of the tokenizer's robots.
         masses: of the tokenizer's robots.
         scales: of the windows, see :class:`Scales`.

@@ -22,7 +22,7 @@ from loco_drake.common.rotations import (
     quat_rotate,
 )
 from loco_drake.models.legs import LEGS, MIRROR_JOINT_SIGNS, MIRROR_POLAR
-from loco_drake.models.robots import ROBOTS, Robot, get_robot
+from loco_drake.models.robots import ROBOTS, Robot, get_robot, known_robot
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.quality import toe_trajectories
 
@@ -52,14 +52,14 @@ _MOST_LATE = 10  # frames that velocities may be found to lag; up to 2 are a fil
 def in_robot_order(motion: Motion) -> Motion:
     """Returns the motion with its joints in the order of its robot.
 
-    Motions of robots that are not in :data:`ROBOTS` are left as they are.
+    Motions of robots that this process does not know are left as they are.
 
     Raises:
         InputError: if its joints are not those of the robot.
     """
-    if motion.robot not in ROBOTS:
+    if (robot := known_robot(motion.robot)) is None:
         return motion
-    names = get_robot(motion.robot).joint_names
+    names = robot.joint_names
     if motion.joint_names == names:
         return motion
     if sorted(motion.joint_names) != sorted(names):
@@ -82,7 +82,7 @@ def in_robot_order(motion: Motion) -> Motion:
 def check_conventions(motion: Motion) -> None:
     """Raises InputError, with the reason, where the data contradict each other.
 
-    Feet, limits and joint speeds are checked of robots in :data:`ROBOTS`.
+    Feet, limits and joint speeds are checked of robots that this process knows.
     """
     if len(motion) < MIN_FRAMES:
         raise InputError(f"It needs at least {MIN_FRAMES} frames, not {len(motion)}.")
@@ -92,7 +92,7 @@ def check_conventions(motion: Motion) -> None:
         raise InputError(
             f"Its base is {far:.3g} m from the origin, which must be in metres."
         )
-    robot = get_robot(motion.robot) if motion.robot in ROBOTS else None
+    robot = known_robot(motion.robot)
     if robot is not None:
         _check_joints(motion, robot)
     _check_speeds(

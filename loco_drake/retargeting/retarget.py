@@ -16,8 +16,7 @@ from loco_drake.datasets.split import Split
 from loco_drake.engine.executor import Executor
 from loco_drake.engine.local import LOCAL
 from loco_drake.models.quadruped import Quadruped
-from loco_drake.models.robot_files import load_robot
-from loco_drake.models.robots import get_robot
+from loco_drake.models.robots import get_robot, load_robot
 from loco_drake.motion import quality
 from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.keypoints import KeypointClip
@@ -132,7 +131,7 @@ def retarget_clip(
     )
     grounding = None
     if variant.ground:
-        motion, grounding, solved = ground(motion, get_robot(robot.name), solver)
+        motion, grounding, solved = ground(motion, get_robot(robot.definition), solver)
     seconds = time.perf_counter() - began
     p_WF = quality.toe_trajectories(motion, robot)
     standing = None if config.stance_height is not None else on_feet(clip)

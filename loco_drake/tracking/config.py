@@ -60,8 +60,8 @@ class ResetNoise:
 class EnvironmentConfig:
     """Configuration of an environment, without its plans."""
 
-    # Robot: go2 or a1.
-    robot: Annotated[str, tyro.conf.arg(metavar="ROBOT")] = "go2"
+    # Robot: go2, a1, or a YAML file, see docs/own_robot.md.
+    robot: Annotated[str, tyro.conf.arg(metavar="ROBOT|FILE")] = "go2"
     # Contact solver, time step and friction.
     plant: PlantConfig = field(default_factory=PlantConfig)
     # Distance from the plan at which an episode ends.

@@ -117,6 +117,12 @@ class RandomizationConfig:
                     f"The randomization's {name} must be two numbers, the smaller one "
                     f"first, of at least {least:g}{limit}, not {low:g} and {high:g}."
                 )
+        lightest = (self.payload or (0.0,))[0]
+        if robot is not None and lightest < robot.least_payload:
+            raise InputError(
+                f"The randomization's payload of {robot.name} must be at least "
+                f"{robot.least_payload:.2g} kg, not {lightest:g}: its trunk is light."
+            )
         if robot is not None and not (self.motor_strength is self.damping is None):
             weakest = (self.motor_strength or (1.0,))[0] * (self.damping or (1.0,))[0]
             check_strength(robot, plant or PlantConfig(), weakest)

@@ -19,7 +19,7 @@ from loco_drake.common.files import atomic_path
 from loco_drake.common.typed import FieldError, convert
 from loco_drake.common.typed_yaml import read_yaml
 from loco_drake.generation.generate import check_duration
-from loco_drake.models.robots import ROBOTS
+from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS, GaitLabel, parse_label
 from loco_drake.tracking.config import TrainingConfig
 
@@ -151,7 +151,7 @@ class Recipe:
 
     def check(self) -> None:
         """Raises InputError unless everything can begin."""
-        check_choice("robot", self.robot, ROBOTS)
+        get_robot(self.robot)
         check_at_least("seed", self.seed, 0)
         check_bounds("The recipe's environments", self.environments, 1)
         if not (self.stages and self.references):

@@ -85,7 +85,7 @@ def _generate(
     report: Callable[[int, int], None],
     stopped: Callable[[], bool],
 ) -> bool:
-    model, first = pretrained_motion_model(robot.name), references.first_seed
+    model, first = pretrained_motion_model(robot.definition), references.first_seed
     solver = LegSolver(robot, FPS) if references.grounded else None
     last = first + references.count
     total, done = len(references.gaits) * references.count, 0

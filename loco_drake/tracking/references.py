@@ -61,7 +61,7 @@ def generate_references(
     Raises:
         InputError: if the model does not know the robot or a label.
     """
-    model = pretrained_motion_model(robot.name)
+    model = pretrained_motion_model(robot.definition)
     seeds = range(seed, seed + count)
     motions: list[Motion] = []
     for label in labels:

@@ -23,6 +23,7 @@ from loco_drake.control.actor import ActorConfig
 from loco_drake.control.plan import Plan
 from loco_drake.engine.executor import Executor
 from loco_drake.engine.local import LOCAL
+from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.tracking.beginning import (
     LAYOUT,
@@ -158,7 +159,7 @@ def train_tracker(
         finally:
             environment.close()
     return {
-        "robot": config.environment.robot,
+        "robot": get_robot(config.environment.robot).name,
         "steps": saver.saved_steps,
         "wall_clock_s": time.monotonic() - start,
         "interrupted": interrupted,
@@ -244,7 +245,7 @@ class _Saver(BaseCallback):
         self.run.save(*_state(learner, self.sampler))
         self.saved_steps = learner.num_timesteps
         actor = ActorConfig(
-            robot=self.config.environment.robot,
+            robot=get_robot(self.config.environment.robot).name,
             labels=[str(ROW_LABELS[i]) for i in self.sampler.present],
             hidden=self.config.ppo.hidden,
             privileged=self.config.ppo.privileged,

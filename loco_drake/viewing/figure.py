@@ -13,7 +13,7 @@ from loco_drake.control.state import JOINTS, ORIENTATION, POSITION
 from loco_drake.models.chains import ChainRobot
 from loco_drake.models.legs import LEGS
 from loco_drake.models.quadruped import Quadruped
-from loco_drake.models.robots import AddRobotModel
+from loco_drake.models.robot import Robot
 
 # m; where what is not shown is, under the floor.
 AWAY = np.array([0.0, 0.0, -50.0])
@@ -35,8 +35,9 @@ def AddFigure(
     ``prefix`` tells it from others of its kind.
     """
     parser = Parser(plant, prefix)
-    if not isinstance(robot, ChainRobot):
-        return AddRobotModel(parser, robot.name, visual=True)
+    if isinstance(robot, Robot):
+        return robot.AddModel(parser, visual=True)
+    assert isinstance(robot, ChainRobot)
     instance = robot.AddModel(parser)
     _AddSticks(plant, robot, instance)
     return instance

@@ -276,7 +276,9 @@ def test_help_of_simulate_has_units_and_defaults(capsys):
         main(["simulate", "--help"])
     # Each option with what is said of it, on one line.
     printed = re.sub(r"[\s│]+", " ", capsys.readouterr().out)
-    assert re.search(r"--robot ROBOT [^(]*go2 or a1[^(]* \(default: go2\)", printed)
+    assert re.search(
+        r"--robot ROBOT.FILE [^(]*go2, a1, or[^(]* \(default: go2\)", printed
+    )
     assert re.search(r"--gait GAIT [^(]* \(default: dog-trot\)", printed)
     assert re.search(r"--duration FLOAT Duration in s[^(]* \(default: 10.0\)", printed)
     assert re.search(r"--time-step FLOAT [^(]*, s. \(default: 0.01\)", printed)

@@ -6,7 +6,7 @@ from pydrake.geometry import Meshcat
 
 from loco_drake.cli import play
 from loco_drake.cli.main import main
-from loco_drake.models.robot_files import load_robot
+from loco_drake.models.robots import load_robot
 from loco_drake.motion.motion_file import save_motion
 from loco_drake.viewing.player import FORWARD, PAUSE, STOP
 from tests.meshcat_messages import animation, click

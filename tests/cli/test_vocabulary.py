@@ -25,6 +25,7 @@ KINDS = ["FILE", "DIR", "URL", "ROBOT", "GAIT", "LABEL", "SOURCE", "NAME", "POLI
 KINDS += ["TEXT", "VX", "VY", "WZ", "LOW", "HIGH", "INT", "FLOAT"]
 # What a required argument may be, so that a command gets as far as its outputs.
 REQUIRED = {"record": ["--motions", "a"], "data inspect": ["a.bvh"]}
+REQUIRED["robot inspect"] = ["a.yaml"]
 OUTPUT = re.compile(r"\bto write\b|^Folder for pictures\b")
 
 

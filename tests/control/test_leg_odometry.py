@@ -7,9 +7,10 @@ import torch
 from loco_drake.common.rotations import heading_matrix, quat_to_matrix
 from loco_drake.control.leg_odometry import LegOdometry
 from loco_drake.models.robots import get_robot
+from tests.robot_files import OWN
 
 
-@pytest.mark.parametrize("name", ["go2", "a1"])
+@pytest.mark.parametrize("name", ["go2", "a1", str(OWN["anymal"])])
 def test_legs_that_stand_still_tell_velocity_and_height(name):
     """A base moves for a microsecond; by its joints each toe stays where it is."""
     robot, random = get_robot(name), np.random.default_rng(0)

@@ -11,6 +11,7 @@ from loco_drake.generation.tokenizer_score import Toes
 from loco_drake.models.robots import get_robot
 from loco_drake.motion import momentum
 from loco_drake.motion.quality import toe_trajectories
+from tests.robot_files import OWN
 
 ROBOTS = ("go2", "a1")
 
@@ -20,11 +21,12 @@ def batch(robot, *motions):
     return torch.tensor(np.stack([ft.motion_features(robot, m) for m in motions]))
 
 
-@pytest.mark.parametrize("name", ROBOTS)
-def test_the_points_move_like_the_bodies_of_drakes_model(make_synthetic, name):
-    robot = get_robot(name)
-    motion = make_synthetic("dog-trot", 2.0, 0.8, 0.3, name=name)
-    masses, index = PointMasses(ROBOTS), torch.tensor([ROBOTS.index(name)])
+@pytest.mark.parametrize("definition", [*ROBOTS, str(OWN["anymal"])])
+def test_the_points_move_like_the_bodies_of_drakes_model(make_synthetic, definition):
+    """Also of ANYmal, whose rear knees point forward and whose zeros are offset."""
+    robot = get_robot(definition)
+    motion = make_synthetic("dog-trot", 2.0, 0.8, 0.3, name=robot.name)
+    masses, index = PointMasses(("go2", robot.name)), torch.tensor([1])
     features = batch(robot, motion)
     found = masses.wrench(features, index)[0].numpy()
     model = momentum.mass_model(robot)

@@ -5,8 +5,7 @@ import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from loco_drake.models.robot_files import load_robot
-from loco_drake.models.robots import get_robot
+from loco_drake.models.robots import get_robot, load_robot
 from tests.robot_files import FOREIGN, SOLO8, write_robot
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from loco_drake.common.errors import InputError
 from loco_drake.datasets.registry import read_clip
-from loco_drake.models.robot_files import load_robot
+from loco_drake.models.robots import load_robot
 from loco_drake.motion.motion import FPS
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.retarget import retarget_clip
@@ -237,8 +237,8 @@ def test_links_at_the_foot_are_no_longer_leg(tmp_path, plain):
     ("text", "reason"),
     [
         ("{urdf: [", "is not a robot file: while parsing"),
-        ("- 1", "it must be a mapping of foot_radius, legs, name, trunk, urdf, not"),
-        ("urfd: x", "unknown field 'urfd'; there are foot_radius, legs, name, trunk"),
+        ("- 1", "it must be a mapping of foot_radius, legs, name, simulation,"),
+        ("urfd: x", "unknown field 'urfd'; there are foot_radius, legs, name, simul"),
         (
             "legs: {FL: {feet: a}}",
             "legs.FL has the unknown field 'feet'; there are foo",

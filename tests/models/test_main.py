@@ -12,5 +12,5 @@ def test_viewer_opens_the_robot_in_its_stance(name, mesh_cache):
 def test_viewer_names_the_robots(capsys):
     assert main(["spot"]) == 2
     assert capsys.readouterr().err == (
-        "Unknown robot 'spot'; the choices are go2, a1.\n"
+        "Unknown robot 'spot'; the choices are go2, a1, or a robot's YAML file.\n"
     )

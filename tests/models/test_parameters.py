@@ -8,13 +8,13 @@ from scipy.optimize import minimize
 
 from loco_drake.common.errors import InputError
 from loco_drake.models.parameters import (
-    LEAST_PAYLOAD,
     SetReflectedInertia,
     SetTrunkLoad,
     check_strength,
     least_strength,
 )
 from loco_drake.models.plant import PlantConfig
+from loco_drake.models.robot import LEAST_PAYLOAD
 from loco_drake.models.robots import ROBOTS, get_robot
 from loco_drake.tracking.randomization import STANDARD, RandomizationConfig
 

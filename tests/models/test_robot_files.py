@@ -3,8 +3,8 @@ import pytest
 
 from loco_drake.common.errors import InputError
 from loco_drake.models.meshes import vendor_folder
-from loco_drake.models.robot_files import is_robot_file, load_robot
-from loco_drake.models.robots import get_robot
+from loco_drake.models.robot_files import is_robot_file
+from loco_drake.models.robots import get_robot, load_robot
 from tests.robot_files import SOLO8, write_robot
 
 URDF = "robots/solo_description/robots/solo.urdf"

@@ -96,7 +96,7 @@ def test_robot_is_shared_and_read_only(name):
 
 def test_unknown_robot_is_named_with_the_choices():
     with pytest.raises(
-        InputError, match=r"Unknown robot 'spot'; the choices are go2, a1\."
+        InputError, match=r"Unknown robot 'spot'; the choices are go2, a1, or"
     ):
         get_robot("spot")
     with pytest.raises(InputError, match="the choices are go2, a1"):

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from loco_drake.datasets.registry import read_clip
-from loco_drake.models.robot_files import load_robot
-from loco_drake.models.robots import get_robot
+from loco_drake.models.robots import get_robot, load_robot
 from loco_drake.retargeting.bounds import BOUNDS, outside_bounds
 from loco_drake.retargeting.retarget import retarget_clip
 from tests.robot_files import SOLO8

@@ -11,7 +11,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from loco_drake.common.rotations import yaw_of
-from loco_drake.models.robot_files import load_robot
+from loco_drake.models.robots import load_robot
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.quality import stance_slip_median

@@ -4,7 +4,7 @@ from pydrake.geometry import Meshcat, Role
 
 from loco_drake.common.rotations import quat_rotate
 from loco_drake.models.legs import LEGS
-from loco_drake.models.robot_files import load_robot
+from loco_drake.models.robots import load_robot
 from loco_drake.viewing.rendering import FIELD_OF_VIEW, HEIGHT, WIDTH
 from loco_drake.viewing.stage import Stage, viewpoint
 from loco_drake.viewing.takes import one_by_one, side_by_side, take_of_motion

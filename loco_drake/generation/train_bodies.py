@@ -1,0 +1,166 @@
+"""Teaching a tokenizer robots that it does not know, and nothing else.
+
+Encoder and decoder are told the robot by a row that is added to their hidden layer.
+Rows of further robots are learned, all else is held: what a code means, and how robots
+are decoded that the tokenizer knows, remains the same to the last bit.
+"""
+
+from collections.abc import Iterable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from loco_drake.common.device import find_device
+from loco_drake.common.errors import InputError
+from loco_drake.common.weights import save_network
+from loco_drake.generation.loop_settings import LoopSettings
+from loco_drake.generation.point_masses import PointMasses
+from loco_drake.generation.tokenizer import BODY_ROWS, Tokenizer, load_tokenizer
+from loco_drake.generation.tokenizer_score import Toes
+from loco_drake.generation.train_tokenizer import (
+    BATCH,
+    WEIGHTS,
+    Scales,
+    tokenizer_losses,
+)
+from loco_drake.generation.training import LoopResult, train
+from loco_drake.generation.training_motions import (
+    Library,
+    read_training_record,
+    training_record,
+)
+from loco_drake.generation.windows import WINDOW, PairedWindows
+
+
+class _Rows(nn.Module):
+    """An embedding of which only the last rows are learned."""
+
+    known: Tensor
+
+    def __init__(self, known: Tensor, count: int) -> None:
+        super().__init__()
+        self.register_buffer("known", known, persistent=False)
+        # Between those of the robots that are known, as another body is.
+        self.new = nn.Parameter(known.mean(dim=0).repeat(count, 1))
+
+    @property
+    def weight(self) -> Tensor:
+        return torch.cat((self.known, self.new))
+
+    def forward(self, robot: Tensor) -> Tensor:
+        return functional.embedding(robot, self.weight)
+
+
+def train_bodies(
+    library: Library, path: Path, settings: LoopSettings
+) -> tuple[Tokenizer, LoopResult]:
+    """Teaches the tokenizer at ``path`` what robots of the library it does not know.
+
+    Where there is motion of a robot that it knows, too, of the same stretches, its
+    tokens are decoded for the new robots, and the other way round. Writes
+    ``tokenizer.safetensors`` if it was not stopped.
+
+    Raises:
+        InputError: if no clip is as long as a window, all robots are known, or the
+            tokenizer cannot be read.
+    """
+    base = load_tokenizer(path)
+    clips = [clip for clip in library.train if len(clip) >= WINDOW]
+    if not clips:
+        raise InputError(f"No motion to train on is at least {WINDOW} frames long.")
+    known = base.config.robots
+    names = tuple(name for name in library.robots if name not in known)
+    if not names:
+        raise InputError(
+            f"The tokenizer knows {', '.join(known)} already: there is none of another "
+            "robot among the motions."
+        )
+    rows = {
+        name.removesuffix(".weight"): _Rows(base.state_dict()[name], len(names))
+        for name in BODY_ROWS
+    }
+    grown = _grown(base, names, rows.values())
+    learning = nn.ModuleDict(rows)
+    # Of which the rows are the ones that are learned.
+    for name, row in rows.items():
+        setattr(grown, name, row)
+    device = find_device(settings.device)
+    grown.to(device)
+    robots = grown.config.robots
+    toes, masses = Toes(robots, device), PointMasses(robots, device)
+    windows, scales = PairedWindows(clips, robots), Scales(clips, device)
+
+    def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
+        target, robot, label = (x.to(device) for x in windows(random, BATCH))
+        losses = tokenizer_losses(
+            _Held(grown), toes, masses, scales(label), target, robot
+        )
+        weighted = (WEIGHTS[name] * loss for name, loss in losses.items())
+        total = sum(weighted, torch.zeros((), device=device))
+        return total, {name: loss.item() for name, loss in losses.items()}
+
+    run = {
+        "network": asdict(grown.config),
+        "weights": WEIGHTS,
+        "motions": library.summary,
+        "base": base.fingerprint,
+    }
+    result = train("tokenizer", learning, loss_of_batch, settings, run)
+    tokenizer = _grown(base, names, rows.values())
+    if not result.stopped:
+        labels = [str(label) for label in library.labels]
+        info = {"labels": labels, "training": _record(library, settings, path)}
+        target = Path(settings.out) / "tokenizer.safetensors"
+        save_network(target, "tokenizer", tokenizer, info, half=True)
+    return tokenizer, result
+
+
+def _record(library: Library, settings: LoopSettings, path: Path) -> dict[str, Any]:
+    """Returns the record of this training, and the recordings of the one before."""
+    record = training_record(library, settings)
+    before = (read_training_record(path, "tokenizer") or {}).get("recordings", {})
+    own = record["recordings"]
+    names = sorted({*before, *own})
+    merged = {name: {**before.get(name, {}), **own.get(name, {})} for name in names}
+    return {**record, "recordings": merged}
+
+
+class _Held:
+    """A tokenizer as :class:`.train_tokenizer.LearningTokenizer`, its codes held."""
+
+    def __init__(self, tokenizer: Tokenizer) -> None:
+        self._tokenizer = tokenizer
+
+    def __call__(
+        self, features: Tensor, robot: Tensor, decoded_for: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        embedded = self._tokenizer.embed(features, robot)
+        with torch.no_grad():
+            codes = self._tokenizer.encode(features, robot)
+            quantized = self._tokenizer.lookup(codes)
+        commitment = (embedded - quantized).square().mean()
+        # Decoded are the codes; their gradient is the embedding's.
+        through = embedded + (quantized - embedded).detach()
+        repeated = through.repeat(len(decoded_for) // len(robot), 1, 1)
+        return self._tokenizer.decode_embedded(repeated, decoded_for), commitment
+
+
+def _grown(base: Tokenizer, names: tuple[str, ...], rows: Iterable[_Rows]) -> Tokenizer:
+    """Returns ``base`` with further robots, ready for inference."""
+    config = replace(
+        base.config,
+        robots=(*base.config.robots, *names),
+        added=(*base.config.added, *names),
+    )
+    tokenizer = Tokenizer(config)
+    weights = {
+        name: row.weight.detach().clone()
+        for name, row in zip(BODY_ROWS, rows, strict=True)
+    }
+    tokenizer.load_state_dict(base.state_dict() | weights)
+    return tokenizer.eval().requires_grad_(False)
