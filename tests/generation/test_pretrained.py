@@ -343,7 +343,7 @@ def test_grounded_motion_of_several_gaits(tmp_path):
         ({"robot": "spot"}, "Unknown robot 'spot'; the choices are go2, a1"),
         ({"duration": 0.0}, "above 0"),
         ({"duration": float("inf")}, "above 0"),
-        ({"count": 0}, "--trajectories"),
+        ({"count": 0}, "--count"),
         ({"seed": -1}, "--seed"),
         ({"temperature": float("nan")}, "temperature"),
         ({"tell": (0.5, float("inf"), 0.0)}, "three finite numbers"),
