@@ -91,7 +91,7 @@ def test_wheel_has_one_package_its_licence_and_no_recordings(wheel):
     assert f"{info}/licenses/LICENSE" in names
     suffixes = {Path(name).suffix for name in names if not name.startswith(info)}
     data = {".urdf", ".xml", ".yaml", ".md", ".safetensors", ".json"}
-    page = {".html", ".css", ".js", ".svg"}
+    page = {".html", ".css", ".js", ".svg", ".webp"}
     assert suffixes <= {".py", ".typed", ".csv", *data, *page}
     results = {str(Path(name).parent) for name in names if name.endswith(".json")}
     assert results == {"loco_drake/models/pretrained/results"}

@@ -49,6 +49,7 @@ class PointMasses:
         self._calf = table([np.array(r.calf_length) for r in robots])
         forward = np.array([r.knee_signs > 0 for r in robots])
         self._forward = torch.tensor(forward, device=device)
+        self._any_forward = bool(forward.any())
         self._height = table([np.array(r.stand_height) for r in robots])
         # Of the feet, in standing heights.
         radii = [np.array([r.foot_radius / r.stand_height]) for r in robots]
@@ -70,7 +71,7 @@ class PointMasses:
         """Returns the points as :meth:`.Toes.positions` does toes, (B, T, 52, 3)."""
         joints = features[..., ft.JOINTS]
         hip, thigh, calf = joints.reshape(*joints.shape[:-1], 4, 3).unbind(-1)
-        if self._forward.any():
+        if self._any_forward:
             thigh, calf = self._turn_knees(thigh, calf, robot)
         zero = torch.zeros_like(hip)
         # Origins of the frames in the frame of the hip, which turns about x.
