@@ -97,7 +97,7 @@ def test_shipped_recipes_need_no_more_steps_than_their_budget(robot):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("robot: a1", "robot: b1", "go2, a1"),
+        ("robot: a1", "robot: spot", "go2, a1"),
         ("seed: 5", "seed: -5", "--seed must be 0 or more, not -5"),
         ("environments: 12", "environments: 0", "environments must be 1 or more"),
         ("environments: 12", "environments: 40", "--batch must be at least 80"),
