@@ -80,12 +80,6 @@ def test_architecture_lists_files_that_exist_each_once_and_few(way, bound):
     assert [path for path in files if not (ROOT / path).is_file()] == []
 
 
-def test_retargeting_shows_the_robot_file_as_it_is():
-    page = (ROOT / "docs" / "retargeting.md").read_text()
-    (block,) = re.findall(r"^```yaml\n(.*?)^```$", page, re.M | re.S)
-    assert block == (ROOT / "examples" / "solo8.yaml").read_text()
-
-
 def test_own_robot_shows_the_robot_file_as_it_is():
     page = (ROOT / "docs" / "own_robot.md").read_text()
     (block,) = re.findall(r"^```yaml\n(.*?)^```$", page, re.M | re.S)
