@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from loco_drake.control.plan import Plan, plan_from_motion
+from loco_drake.datasets.registry import DATASETS
 from loco_drake.models.robots import Robot, get_robot
 from tests.synthetic import write_data_folder
 from tests.synthetic_motion import synthetic_motion
@@ -27,6 +28,15 @@ def real_data() -> Path:
         pytest.skip("needs real recordings: LOCO_DRAKE_DATA names no folder")
     assert Path(folder).is_dir(), f"LOCO_DRAKE_DATA: there is no folder {folder!r}"
     return Path(folder)
+
+
+@pytest.fixture
+def only_known_sources() -> Iterator[None]:
+    """Sources that a test loads are gone after it."""
+    before = dict(DATASETS)
+    yield
+    DATASETS.clear()
+    DATASETS.update(before)
 
 
 @pytest.fixture(scope="session")

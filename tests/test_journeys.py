@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 from loco_drake.cli.main import main
-from loco_drake.datasets.registry import DATASETS
+
+pytestmark = pytest.mark.usefixtures("only_known_sources")
 
 ROOT = Path(__file__).parents[1]
 # What each page makes, and how many commands that takes; own_animal has its own test.
@@ -33,14 +34,6 @@ _DATA = r"`(\S+)`:\n\n```csv\n(.*?)^```$"
 def commands(text):
     blocks = re.findall(r"^```sh\n(.*?)^```$", text, re.M | re.S)
     return [line for block in blocks for line in block.splitlines()]
-
-
-@pytest.fixture(autouse=True)
-def only_known_sources():
-    before = dict(DATASETS)
-    yield
-    DATASETS.clear()
-    DATASETS.update(before)
 
 
 @pytest.mark.slow

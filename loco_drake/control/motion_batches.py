@@ -8,13 +8,14 @@ from pathlib import Path
 from loco_drake.control.steered_motion import steered_motion
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import motion_model_of
+from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import GaitSchedule
-from loco_drake.motion.motion import FPS
+from loco_drake.motion.motion import FPS, Motion
 from loco_drake.motion.motion_file import motion_bytes
 from loco_drake.retargeting.grounding import ground
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 
-BATCH = 32  # motions side by side
+BATCH = 32  # motions side by side; batching changes their last bits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,11 +72,10 @@ class BatchMaker:
             velocity=order.velocity,
         )
         seconds = time.perf_counter() - start
-        for i, seed in enumerate(seeds):
-            if order.steer:
-                motions[i] = steered_motion(robot, motions[i], seed)
-            if order.ground:
-                motions[i] = ground(motions[i], robot, self._solver).motion
+        motions = [
+            finished(motion, robot, seed, steer=order.steer, solver=self._solver)
+            for motion, seed in zip(motions, seeds, strict=True)
+        ]
         frames = sum(map(len, motions))
         return Batch(
             files=[motion_bytes(motion) for motion in motions],
@@ -83,6 +83,19 @@ class BatchMaker:
             tokens=frames / self._model.frames_per_token,
             seconds=seconds,
         )
+
+
+def finished(
+    motion: Motion, robot: Robot, seed: int, *, steer: bool, solver: LegSolver | None
+) -> Motion:
+    """Returns a motion as it is wanted, given the seed that it was generated with.
+
+    It is steered along the path of commands that the seed draws if ``steer``, and made
+    to obey physics if there is a solver.
+    """
+    if steer:
+        motion = steered_motion(robot, motion, seed)
+    return motion if solver is None else ground(motion, robot, solver).motion
 
 
 def batches(first: int, count: int) -> list[range]:

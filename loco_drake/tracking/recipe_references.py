@@ -8,21 +8,19 @@ from pathlib import Path
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import read_json, write_json
-from loco_drake.control.steered_motion import steered_motion
+from loco_drake.control.motion_batches import batches, finished
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import Robot
 from loco_drake.models.shipped import pretrained_path
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.motion_file import save_motion
-from loco_drake.retargeting.grounding import ground
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.tracking.recipe import ReferenceSet
 from loco_drake.tracking.references import read_motions
 
 # Says what a folder holds, and whether all of it is there.
 MARK = "references.json"
-_BATCH = 32  # motions side by side; batching changes their last bits
 
 
 def make_references(
@@ -85,24 +83,20 @@ def _generate(
     report: Callable[[int, int], None],
     stopped: Callable[[], bool],
 ) -> bool:
-    model, first = pretrained_motion_model(robot.definition), references.first_seed
+    model = pretrained_motion_model(robot.definition)
     solver = LegSolver(robot, FPS) if references.grounded else None
-    last = first + references.count
     total, done = len(references.gaits) * references.count, 0
     for label in references.gaits:
-        for start in range(first, last, _BATCH):
+        for seeds in batches(references.first_seed, references.count):
             if stopped():
                 return False
-            seeds = range(start, min(start + _BATCH, last))
             paths = [folder / f"{label}-{seed}.npz" for seed in seeds]
             if not all(path.is_file() for path in paths):
                 motions = generate_motions(model, label, references.seconds, seeds)
                 for seed, path, motion in zip(seeds, paths, motions, strict=True):
-                    if references.steered:
-                        motion = steered_motion(robot, motion, seed)
-                    if references.grounded:
-                        motion = ground(motion, robot, solver).motion
-                    save_motion(motion, path)
+                    steer = references.steered
+                    made = finished(motion, robot, seed, steer=steer, solver=solver)
+                    save_motion(made, path)
             done += len(seeds)
             report(done, total)
     return True

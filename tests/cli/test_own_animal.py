@@ -10,7 +10,6 @@ import pytest
 import yaml
 
 from loco_drake.cli.main import main
-from loco_drake.datasets.registry import DATASETS
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gait_timing import gait_timing, motion_track
 from loco_drake.motion.motion_file import load_motion
@@ -24,15 +23,9 @@ from tests.synthetic_animals import (
     write_bvh,
 )
 
+pytestmark = pytest.mark.usefixtures("only_known_sources")
+
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture(autouse=True)
-def only_known_sources():
-    before = dict(DATASETS)
-    yield
-    DATASETS.clear()
-    DATASETS.update(before)
 
 
 @pytest.mark.parametrize(

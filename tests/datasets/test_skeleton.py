@@ -5,10 +5,12 @@ import pytest
 
 from loco_drake.common.errors import InputError
 from loco_drake.datasets.named_points import read_points
-from loco_drake.datasets.registry import DATASETS, read_clip
+from loco_drake.datasets.registry import read_clip
 from loco_drake.datasets.skeleton import load_source, read_skeleton
 from loco_drake.retargeting.scaling import load_config
 from tests.synthetic_animals import CAT, HORSE, make_motion, write_bvh
+
+pytestmark = pytest.mark.usefixtures("only_known_sources")
 
 CAT_YAML = """
 withers: Chest
@@ -34,15 +36,6 @@ hip: hip
 toes: {FL: paw_fl, FR: paw_fr, RL: paw_rl, RR: paw_rr}
 units: mm
 """
-
-
-@pytest.fixture(autouse=True)
-def only_known_sources():
-    """Sources that a test loads are gone after it."""
-    before = dict(DATASETS)
-    yield
-    DATASETS.clear()
-    DATASETS.update(before)
 
 
 def load(path, text):
