@@ -11,6 +11,8 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable, RevoluteJoint, RigidBody
 from pydrake.systems.framework import Context, DiagramBuilder
 
+from loco_drake.common.gravity import GRAVITY
+
 from .robots import Robot
 from .xml_text import add_element
 
@@ -20,7 +22,6 @@ OPTIONS = {"integrator": "implicitfast", "cone": "elliptic", "impratio": 100.0}
 # MuJoCo's impedance d of a contact, at any depth. The nearer it is to 1, the more the
 # contact resists acceleration like a mass that the feet do not have.
 _IMPEDANCE = 0.5
-_GRAVITY = 9.81  # m/s^2
 
 
 def robot_mjcf(robot: Robot, *, friction: float = 0.8) -> str:
@@ -73,7 +74,7 @@ class _Writer:
         root = ET.Element("mujoco", model=robot.name)
         add_element(root, "compiler", angle="radian", inertiafromgeom="false")
         add_element(
-            root, "option", timestep=TIME_STEP, gravity=[0, 0, -_GRAVITY], **OPTIONS
+            root, "option", timestep=TIME_STEP, gravity=[0, 0, -GRAVITY], **OPTIONS
         )
         world = add_element(root, "worldbody")
         # Bits of contype and conaffinity: all shapes touch the ground only.
@@ -158,7 +159,7 @@ class _Writer:
         }
         own = material["coulomb_friction"].dynamic_friction()
         stiffness = material["point_contact_stiffness"]
-        weight = self._robot.mass * _GRAVITY
+        weight = self._robot.mass * GRAVITY
         damping = material["hunt_crossley_dissipation"] * weight
         scale = (1 - _IMPEDANCE) * inverse_mass(self._plant, self._context, body)
         add_element(

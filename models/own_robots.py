@@ -15,6 +15,7 @@ from pydrake.systems.framework import Context
 
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
+from loco_drake.common.gravity import GRAVITY
 
 from .chains import ChainRobot
 from .leg_geometry import leg_geometry
@@ -28,7 +29,6 @@ from .robot_urdf import Motors, Shapes, write_urdf
 from .simulation_file import SimulationFile
 from .urdf import find_urdf
 
-GRAVITY = 9.81  # m/s^2
 # Of Go2's and A1's motors: reflected inertia over the square of the torque limit, s^2.
 # Gears change both alike.
 ROTOR_SHARE = 8e-6

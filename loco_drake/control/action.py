@@ -5,13 +5,13 @@ from functools import lru_cache
 import numpy as np
 
 from loco_drake.common.arrays import Array, read_only
+from loco_drake.common.gravity import GRAVITY
 from loco_drake.common.rotations import quat_conjugate, quat_rotate
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.state import JOINT_VELOCITIES, JOINTS, ORIENTATION, VELOCITY
 from loco_drake.models.robots import Robot
 
 ACTION_SCALE = 0.15  # rad per unit of action: 15 Nm on both robots
-GRAVITY = 9.81  # m/s^2
 MAX_LOAD = 2.5  # robot weights
 
 

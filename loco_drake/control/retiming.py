@@ -10,8 +10,8 @@ from toppra.constraint import JointAccelerationConstraint, JointVelocityConstrai
 from toppra.interpolator import AbstractGeometricPath
 
 from loco_drake.common.arrays import Array
+from loco_drake.common.gravity import GRAVITY
 from loco_drake.common.immutable import Immutable
-from loco_drake.control.action import GRAVITY
 from loco_drake.control.plan import (
     PLAN_DT,
     Plan,

@@ -12,6 +12,7 @@ from itertools import groupby
 import numpy as np
 
 from loco_drake.common.arrays import Array, Integers
+from loco_drake.common.gravity import GRAVITY
 from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import (
     angular_velocity,
@@ -22,7 +23,6 @@ from loco_drake.common.rotations import (
     rotate_plane,
     yaw_quat,
 )
-from loco_drake.control.action import GRAVITY
 from loco_drake.control.command import ANY_COMMAND, CommandRange, check_finite
 from loco_drake.control.footholds import Bend, toe_offsets
 from loco_drake.control.ground_path import (

@@ -13,6 +13,7 @@ import numpy as np
 
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
+from loco_drake.common.gravity import GRAVITY
 from loco_drake.datasets.recording import (
     Body,
     Recording,
@@ -22,7 +23,6 @@ from loco_drake.datasets.recording import (
 )
 from loco_drake.motion.gait_timing import Track, stride_period
 
-GRAVITY = 9.81
 # The trunk's middle is this near to straight above the toes, as a cosine.
 UPRIGHT = 0.9
 # ... and even while an animal sits, or rears, no further from it than this.

@@ -12,7 +12,7 @@ import numpy as np
 
 from loco_drake.common.arrays import Array, Bools
 from loco_drake.common.errors import InputError
-from loco_drake.datasets.conventions import GRAVITY
+from loco_drake.common.gravity import GRAVITY
 from loco_drake.datasets.guess_toes import Toes, common_joint, guess_toes
 from loco_drake.datasets.guess_trunk import guess_trunk
 from loco_drake.datasets.joint_names import end_of, side_of

@@ -23,8 +23,8 @@ from scipy.ndimage import binary_erosion
 
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
+from loco_drake.common.gravity import GRAVITY
 from loco_drake.datasets.conventions import (
-    GRAVITY,
     ground_height,
     orient,
     stride_of,

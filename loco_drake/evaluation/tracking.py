@@ -15,6 +15,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, EventStatus
 from pydrake.systems.primitives import LogVectorOutput
 
 from loco_drake.common.arrays import Array
+from loco_drake.common.gravity import GRAVITY
 from loco_drake.common.rotations import (
     quat_error,
     quat_multiply,
@@ -22,7 +23,6 @@ from loco_drake.common.rotations import (
     yaw_of,
     yaw_quat,
 )
-from loco_drake.control.action import GRAVITY
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.state import (
     HEIGHT,

@@ -16,10 +16,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from torch import Tensor
 
 from loco_drake.common.arrays import Array
+from loco_drake.common.gravity import GRAVITY
 from loco_drake.generation import features as ft
 from loco_drake.generation.tokenizer_score import over_ground
 from loco_drake.models.robots import Robot, get_robot
-from loco_drake.motion.momentum import G
 from loco_drake.motion.motion import FPS
 
 # Alternate corners of a box, (4, 3).
@@ -163,7 +163,7 @@ class PointMasses:
         ).sum(2)
         rate = features[:, 1:, ft.YAW_RATE]
         rate = (rate[:, 1:] + rate[:, :-1]) / 2
-        scaled = (angular / (G * height[:, None, None]), v_com / G)
+        scaled = (angular / (GRAVITY * height[:, None, None]), v_com / GRAVITY)
         return torch.cat([_change(value, rate) for value in scaled], dim=-1)
 
 

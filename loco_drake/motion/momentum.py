@@ -20,13 +20,13 @@ from pydrake.multibody.plant import MultibodyPlant
 from scipy.optimize import nnls
 
 from loco_drake.common.arrays import Array, Bools
+from loco_drake.common.gravity import GRAVITY
 from loco_drake.common.rotations import quat_error
 from loco_drake.models.robots import Robot
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.quality import toe_trajectories
 
-GRAVITY = np.array([0.0, 0.0, -9.81])  # m/s^2, in the world
-G = 9.81  # m/s^2
+GRAVITY_W = np.array([0.0, 0.0, -GRAVITY])  # m/s^2
 
 # Of a foot on the ground of the scenarios, the harmonic mean of .8 and .8.
 FRICTION = 0.8
@@ -109,7 +109,7 @@ def halfway(q: Array, fps: float) -> tuple[Array, Array]:
 
 def wrench(momentum: Momentum, mass: float, fps: float) -> Array:
     """Returns [L', m (c'' - g)] in N m and N at the frames 1 to T - 2, (T - 2, 6)."""
-    force = mass * (np.diff(momentum.com, 2, axis=0) * fps**2 - GRAVITY)
+    force = mass * (np.diff(momentum.com, 2, axis=0) * fps**2 - GRAVITY_W)
     return np.hstack((np.diff(momentum.angular, axis=0) * fps, force))
 
 
@@ -121,7 +121,7 @@ def free_fall_error(motion: Motion, robot: Robot) -> float | None:
     """
     model = mass_model(robot)
     com = model.momentum(positions(motion), motion.fps).com
-    fall = np.diff(com, 2, axis=0) * motion.fps**2 - GRAVITY
+    fall = np.diff(com, 2, axis=0) * motion.fps**2 - GRAVITY_W
     flight = ~motion.contacts[1:-1].any(axis=1)
     if not flight.any():
         return None
@@ -148,7 +148,7 @@ def missing_wrench(motion: Motion, robot: Robot) -> Array:
     """
     model = mass_model(robot)
     momentum = model.momentum(positions(motion), motion.fps)
-    weight = model.mass * G
+    weight = model.mass * GRAVITY
     scale = weight * np.array([robot.stand_height] * 3 + [1.0] * 3)
     needed = wrench(momentum, model.mass, motion.fps) / scale
     soles = toe_trajectories(motion, robot) - [0.0, 0.0, robot.foot_radius]

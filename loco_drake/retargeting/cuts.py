@@ -16,8 +16,8 @@ from itertools import pairwise
 import numpy as np
 
 from loco_drake.common.arrays import Array
+from loco_drake.common.gravity import GRAVITY
 from loco_drake.common.runs import intervals
-from loco_drake.datasets.conventions import GRAVITY
 from loco_drake.motion.gait_timing import GaitTiming, clip_track, gait_timing
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.retargeting.contacts import detect_contacts, on_feet, stance_height

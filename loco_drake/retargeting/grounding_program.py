@@ -20,7 +20,8 @@ from scipy.sparse import (
 )
 
 from loco_drake.common.arrays import Array, Bools, Integers
-from loco_drake.motion.momentum import GRAVITY, G
+from loco_drake.common.gravity import GRAVITY
+from loco_drake.motion.momentum import GRAVITY_W
 from loco_drake.retargeting.correction import difference_matrix
 from loco_drake.retargeting.least_squares import solve_least_squares
 
@@ -99,11 +100,11 @@ _Rows = tuple[csc_matrix, Array]
 def _force_rows(at: Linearization, frame: Integers) -> _Rows:
     """Returns (c'' - g) / g - sum f in the frames 1 to T - 2."""
     frames = len(at.com)
-    scale = at.fps**2 / G
+    scale = at.fps**2 / GRAVITY
     second = diags_array(
         (1.0, -2.0, 1.0), offsets=(0, 1, 2), shape=(frames - 2, frames)
     )
-    now = np.diff(at.com, 2, axis=0) * scale - GRAVITY / G
+    now = np.diff(at.com, 2, axis=0) * scale - GRAVITY_W / GRAVITY
     motion = scale * _per_axis(second, 3) @ _blocks(at.com_matrices)
     return hstack((motion, -_per_axis(_inner_sums(frame, frames), 3))), -now.ravel()
 
@@ -115,7 +116,7 @@ def _moment_rows(at: Linearization, frame: Integers, foot: Integers) -> _Rows:
     of c.
     """
     frames = len(at.com)
-    scale = at.fps / (at.mass * G * at.height)
+    scale = at.fps / (at.mass * GRAVITY * at.height)
     rate = diags_array((-1.0, 1.0), offsets=(0, 1), shape=(frames - 1, frames)) * at.fps
     between = diags_array(
         (-scale, scale), offsets=(0, 1), shape=(frames - 2, frames - 1)

@@ -7,7 +7,8 @@ is due now; q_J and v_J are the joints. R' is the transpose of R.
 
 from typing import Any, NamedTuple
 
-from loco_drake.control.action import GRAVITY, MAX_LOAD, velocity_gain
+from loco_drake.common.gravity import GRAVITY
+from loco_drake.control.action import MAX_LOAD, velocity_gain
 from loco_drake.control.actor import PRIVILEGED, Actor
 from loco_drake.control.observation import (
     LOOK_AHEAD,

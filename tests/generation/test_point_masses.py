@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from loco_drake.common.gravity import GRAVITY
 from loco_drake.common.rotations import rotate_plane, yaw_of
 from loco_drake.generation import features as ft
 from loco_drake.generation.point_masses import REGULARIZATION, PointMasses
@@ -32,8 +33,8 @@ def test_the_points_move_like_the_bodies_of_drakes_model(make_synthetic, definit
     model = momentum.mass_model(robot)
     q = momentum.positions(motion)
     wrench = momentum.wrench(model.momentum(q, motion.fps), model.mass, motion.fps)
-    moment, force = wrench[:, :3], wrench[:, 3:] + model.mass * momentum.GRAVITY
-    weight = model.mass * momentum.G
+    moment, force = wrench[:, :3], wrench[:, 3:] + model.mass * momentum.GRAVITY_W
+    weight = model.mass * GRAVITY
     yaw = yaw_of(motion.base_quaternion)[1:-1]
     for column, expected in (
         (0, moment / (weight * robot.stand_height)),

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from pydrake.geometry import Meshcat
 
-from loco_drake.control.action import GRAVITY
+from loco_drake.common.gravity import GRAVITY
 from loco_drake.models.legs import LEGS
 from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.drawing import FORCE_SCALE

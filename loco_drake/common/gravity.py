@@ -1,0 +1,3 @@
+"""Gravity."""
+
+GRAVITY = 9.81  # m/s^2
