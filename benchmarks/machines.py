@@ -4,13 +4,14 @@
 are exchanged with workers that do nothing. Time and bytes are those of a task and of a
 step of one worker's robots.
 
-*Two workers against one.* Episodes of a Go2 are simulated, and
-the environments of a training stepped, by one worker and by two in turns; the ratio of
-work per second is the median over the turns. It needs two idle cores.
+*More workers against one.* Episodes of a Go2 are simulated, the environments of a
+training stepped and, if there are recordings, clips retargeted, by one worker and by
+more in turns; the ratio of work per second is the median over the turns. It needs as
+many idle cores as workers.
 
 Run it from the root of the repository, on the engines to be compared:
 
-    OMP_NUM_THREADS=1 python benchmarks/machines.py --engines local ray
+    OMP_NUM_THREADS=1 python benchmarks/machines.py --engines local ray --workers 2
 """
 
 import pickle
@@ -19,6 +20,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from statistics import median
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -27,11 +29,14 @@ import tyro
 
 from loco_drake.cli.output import write_json
 from loco_drake.control.plan import Plan
+from loco_drake.datasets.registry import data_dir
+from loco_drake.datasets.segments import Segment, read_segments
 from loco_drake.engine.choice import make_executor
 from loco_drake.engine.executor import Executor
 from loco_drake.evaluation.tracking_table import generated_trials, run_trials
 from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import policy_path
+from loco_drake.retargeting.retarget import retarget_segments
 from loco_drake.systems.scenario import GeneratedReference, Scenario, TrainedPolicy
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.references import generate_references
@@ -152,20 +157,35 @@ def stepped(executor: Executor, plans: list[Plan], steps: int) -> float:
         environments.close()
 
 
+def retargeted(executor: Executor, segments: Sequence[Segment]) -> float:
+    """Returns clips retargeted per second, the workers' start not counted."""
+    count = executor.workers
+    with TemporaryDirectory() as folder:
+        clips = [*segments[:count], *segments]
+        done = retarget_segments(clips, get_robot("go2"), Path(folder), None, executor)
+        for _ in range(count):
+            next(done)
+        start = time.perf_counter()
+        left = sum(1 for _ in done)
+        return left / (time.perf_counter() - start)
+
+
 def speedups(
     executors: Sequence[Executor], work: Callable[[Executor], float], turns: int
-) -> tuple[float, float]:
-    """Returns the work per second of the first, and how many times it the last does."""
+) -> tuple[float, list[float]]:
+    """Returns the first's work per second, and how many times it each other does."""
     rates = [[work(executor) for executor in executors] for _ in range(turns)]
-    return median(r[0] for r in rates), median(r[-1] / r[0] for r in rates)
+    ratios = [median(r[i] / r[0] for r in rates) for i in range(1, len(executors))]
+    return median(r[0] for r in rates), ratios
 
 
 def main(
     engines: tuple[str, ...] = ("local", "ray"),
-    workers: int = 2,
+    workers: tuple[int, ...] = (2,),
     tasks: int = 300,
     episodes: int = 20,
     steps: int = 200,
+    clips: int = 0,
     turns: int = 5,
     ray_address: str | None = None,
     json: Path | None = None,
@@ -174,10 +194,12 @@ def main(
 
     Args:
         engines: local, ray or both.
-        workers: to compare one worker with.
+        workers: numbers of them to compare one worker with.
         tasks: of which overheads are means.
         episodes: of 5 s, that are simulated in each turn; 0 for none.
         steps: of each environment in each turn; 0 for none.
+        clips: that are retargeted in each turn, of the recordings in
+            ``LOCO_DRAKE_DATA``; 0 for none.
         turns: medians are of.
         ray_address: of the Ray cluster.
         json: where to write the figures.
@@ -192,17 +214,22 @@ def main(
     for engine in engines:
         address = ray_address if engine == "ray" else None
         # Ray's own cluster has as many cores as its first work wants.
-        executors = [make_executor(engine, n, address) for n in (workers, 1)][::-1]
-        found = overhead(executors[-1], step, reply, tasks)
+        most_first = sorted({*workers, 1}, reverse=True)
+        executors = [make_executor(engine, n, address) for n in most_first]
+        found = overhead(executors[0], step, reply, tasks)
         works: dict[str, Callable[[Executor], float]] = {}
         if episodes:
             works["episodes"] = partial(simulated, episodes=episodes)
         if steps:
             works["steps"] = partial(stepped, plans=plans, steps=steps)
+        if clips:
+            segments = read_segments(data_dir())[:clips]
+            works["clips"] = partial(retargeted, segments=segments)
         for name, work in works.items():
-            rate, ratio = speedups(executors, work, turns)
+            rate, ratios = speedups(executors[::-1], work, turns)
             found[f"{name}_per_second"] = rate
-            found[f"{name}_ratio"] = ratio
+            for count, ratio in zip(most_first[-2::-1], ratios, strict=True):
+                found[f"{name}_ratio_of_{count}"] = ratio
         figures |= {f"{engine}_{name}": value for name, value in found.items()}
     for name, value in figures.items():
         print(f"{name.replace('_', ' '):36} {value:10.3f}")
