@@ -12,8 +12,10 @@ EYE, TARGET = (0.35, -1.25, 0.55), (0.0, 0.0, 0.2)
 _SUN = "/Lights/FillLight/<object>"
 # From behind the left shoulder of who looks from EYE, m.
 _SUN_PLACE = [-1.75, -3.0, 6.0]
-# Shadows are drawn that far around the origin, m, with so many pixels along a side.
-_SHADOW_REACH, _SHADOW_PIXELS = 3.0, 1024.0
+# Shadows are drawn that far around the origin, m, with so many pixels along a side; for
+# a longer way with more, up to the most that every browser has.
+_SHADOW_REACH, _SHADOW_PIXELS, _MOST_PIXELS = 3.0, 1024, 4096
+_AROUND = 1.0  # that the robot and its shadow take around the base, m
 # Times that a replay is repeated.
 _AGAIN = 100_000
 
@@ -33,11 +35,7 @@ def dress(meshcat: Meshcat) -> None:
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.2)
     meshcat.SetProperty(_SUN, "position", _SUN_PLACE)
     meshcat.SetProperty(_SUN, "intensity", 2.2)
-    for side, sign in (("left", -1), ("right", 1), ("bottom", -1), ("top", 1)):
-        meshcat.SetProperty(_SUN, f"shadow.camera.{side}", sign * _SHADOW_REACH)
-    meshcat.SetProperty(_SUN, "shadow.camera.far", 20.0)
-    for side in ("width", "height"):
-        meshcat.SetProperty(_SUN, f"shadow.mapSize.{side}", _SHADOW_PIXELS)
+    _cast_shadows(meshcat, _SHADOW_REACH)
     # Otherwise surfaces would have stripes of their own shadow.
     meshcat.SetProperty(_SUN, "shadow.bias", -0.001)
     meshcat.SetProperty(_SUN, "castShadow", True)
@@ -54,7 +52,9 @@ def publish_replay(meshcat: Meshcat) -> None:
 
 
 def frame(meshcat: Meshcat, p_WB: Array) -> None:
-    """Moves the camera to show all of the base's path, shape (N, 3)."""
+    """Moves the camera to show all of the base's path, shape (N, 3), with shadows."""
+    reach = float(np.linalg.norm(p_WB[:, :2], axis=1).max()) + _AROUND
+    _cast_shadows(meshcat, max(reach, _SHADOW_REACH))
     middle = (p_WB.min(axis=0) + p_WB.max(axis=0)) / 2
     along = p_WB[-1, :2] - p_WB[0, :2]
     length = float(np.hypot(*along))
@@ -62,3 +62,16 @@ def frame(meshcat: Meshcat, p_WB: Array) -> None:
     away = max(1.8, 0.6 * length)
     eye = [*(middle[:2] + away * side), 0.3 + 0.4 * away]
     meshcat.SetCameraPose(eye, [*middle[:2], 0.25])
+
+
+def _cast_shadows(meshcat: Meshcat, reach: float) -> None:
+    """Lets the sun cast shadows up to ``reach`` in m from the origin."""
+    for side, sign in (("left", -1), ("right", 1), ("bottom", -1), ("top", 1)):
+        meshcat.SetProperty(_SUN, f"shadow.camera.{side}", sign * reach)
+    meshcat.SetProperty(_SUN, "shadow.camera.near", -reach)
+    meshcat.SetProperty(_SUN, "shadow.camera.far", 20.0 + reach)
+    pixels = _SHADOW_PIXELS
+    while pixels < _MOST_PIXELS and pixels * _SHADOW_REACH < _SHADOW_PIXELS * reach:
+        pixels *= 2
+    for side in ("width", "height"):
+        meshcat.SetProperty(_SUN, f"shadow.mapSize.{side}", float(pixels))

@@ -8,7 +8,13 @@ import numpy as np
 from loco_drake.common.rotations import yaw_of
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.state import ORIENTATION, VELOCITY, split
-from loco_drake.viewing.captions import Caption, PageText, legend, replay_corner
+from loco_drake.viewing.captions import (
+    Caption,
+    PageText,
+    Track,
+    legend,
+    replay_corner,
+)
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
@@ -28,6 +34,7 @@ class RunView:
         forces: whether it shows contact forces.
         gait: what the gait is called; by default as the plan calls it.
         window: seconds of which the return is shown; by default of all so far.
+        keep: whether to take note without a page, too, for a video.
     """
 
     def __init__(
@@ -38,6 +45,7 @@ class RunView:
         forces: bool = False,
         gait: str | None = None,
         window: float | None = None,
+        keep: bool = False,
     ) -> None:
         self._recorder, self._gait = recorder, gait
         self._legend = legend("plan", forces=forces)
@@ -47,14 +55,15 @@ class RunView:
         self._speeds: deque[float] = deque(maxlen=round(_PERIOD / PLAN_DT))
         self._walked = self._before = ""
         self._changed = -_MARKED
+        self._keep = keep or meshcat is not None
         self._track: list[tuple[float, Caption]] = []
 
     def update(self, now: float) -> None:
         """Takes note of a control period that ended at ``now`` in s, and may show it.
 
-        Without a page it does nothing.
+        Without a page or a video it does nothing.
         """
-        if self._page is None:
+        if not self._keep:
             return
         if self.measure(now):
             self.tell(now, self.caption(now))
@@ -92,6 +101,11 @@ class RunView:
         self._track.append((now if self._track else 0.0, caption))
         if self._page is not None:
             self._page.show(caption)
+
+    @property
+    def track(self) -> Track:
+        """What was told so far."""
+        return tuple(self._track)
 
     def fell(self, now: float) -> None:
         """Says that the robot fell at ``now`` in s, and that this was the end."""

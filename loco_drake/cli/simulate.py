@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from loco_drake.evaluation.tracking import Rollout
     from loco_drake.models.robots import Robot
     from loco_drake.systems.scenario import Scenario
+    from loco_drake.viewing.captions import Track
     from loco_drake.viewing.takes import Scene
 
 
@@ -136,6 +137,7 @@ class Simulate:
             meshcat,
             forces=shown.publish_contacts,
             gait=None if motion is None or motion.gait_changes else str(motion.label),
+            keep=self.video is not None,
         )
         with stop_requests() as stop:
 
@@ -145,6 +147,8 @@ class Simulate:
                 return not stop.is_set()
 
             rollout, wall = recorder.run(duration, after_step)
+        if rollout.fell:
+            view.fell(recorder.context.get_time())
         simulated = (len(rollout.state) - 1) * PLAN_DT
         reference: Any = scenario.reference
         figures = {
@@ -164,8 +168,6 @@ class Simulate:
         def save_replay() -> None:
             if meshcat is None:
                 return
-            if rollout.fell:
-                view.fell(recorder.context.get_time())
             publish_replay(meshcat)
             if not self.follow:
                 frame(meshcat, rollout.state[POSITION])
@@ -175,7 +177,7 @@ class Simulate:
 
         def save_video() -> None:
             if self.video is not None:
-                make_video(self.video, [_scene(robot, rollout)])
+                make_video(self.video, [_scene(robot, rollout, view.track)])
 
         done = (
             f"Stopped after {simulated:g} of {duration:g} s; the figures are of these."
@@ -269,8 +271,8 @@ class Simulate:
         return scenario, min(duration, motion.duration), motion
 
 
-def _scene(robot: "Robot", rollout: "Rollout") -> "Scene":
-    """Returns what a robot did, with its plan's keypoints."""
+def _scene(robot: "Robot", rollout: "Rollout", track: "Track") -> "Scene":
+    """Returns what a robot did, with its plan's keypoints and what is said of it."""
     from loco_drake.control.state import split
     from loco_drake.motion.motion import FPS
     from loco_drake.systems.keypoint_visualizer import keypoints
@@ -278,4 +280,5 @@ def _scene(robot: "Robot", rollout: "Rollout") -> "Scene":
 
     q, _ = split(rollout.state)
     plan_q, _ = split(rollout.plan_state)
-    return Scene((Take(robot.name, robot, FPS, q, keypoints(robot, plan_q)),))
+    take = Take(robot.name, robot, FPS, q, keypoints(robot, plan_q))
+    return Scene((take,), track=track, whose="plan")

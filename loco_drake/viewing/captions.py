@@ -56,6 +56,30 @@ Track = Sequence[tuple[float, Caption]]
 """Captions, each with the time in s from which on it is shown, from 0 on."""
 
 
+@dataclass(frozen=True)
+class LegendRow:
+    """What some colours mean."""
+
+    whose: str  # before them
+    entries: tuple[tuple[Rgba, str], ...]
+
+
+Legend = tuple[LegendRow, ...]
+"""What is always shown below a caption."""
+
+
+def caption_at(track: Track, time: float) -> Caption:
+    """Returns the caption that is shown at ``time`` in s."""
+    begun = [caption for start, caption in track if start <= time + 1e-6]
+    return begun[-1] if begun else track[0][1]
+
+
+def rgb(color: Rgba) -> tuple[int, int, int]:
+    """Returns red, green and blue, 0 to 255."""
+    red, green, blue = (round(255 * part) for part in color.rgba[:3])
+    return red, green, blue
+
+
 class PageText:
     """Text in the upper left corner of Meshcat's page.
 
@@ -64,10 +88,10 @@ class PageText:
 
     Args:
         meshcat: its page gets the text.
-        legend: HTML that is always shown below, see :func:`legend`.
+        legend: what is always shown below, see :func:`legend`.
     """
 
-    def __init__(self, meshcat: Meshcat, legend: str = "") -> None:
+    def __init__(self, meshcat: Meshcat, legend: Legend = ()) -> None:
         self._meshcat, self._legend = meshcat, legend
         self._shown = ""
 
@@ -88,7 +112,7 @@ class PageText:
         self._shown = text
 
 
-def replay_corner(track: Track, legend: str = "") -> str:
+def replay_corner(track: Track, legend: Legend = ()) -> str:
     """Returns HTML of a corner that says what belongs to the time of a recording."""
     told = [(time, _html(caption, legend)) for time, caption in track]
     data = base64.b64encode(json.dumps(told).encode()).decode()
@@ -96,33 +120,32 @@ def replay_corner(track: Track, legend: str = "") -> str:
     return _CORNER.format(_SCRIPT.format(escape(script)))
 
 
-def legend(whose: str, *, points: bool = True, forces: bool = False) -> str:
-    """Returns HTML that says what colours mean.
+def legend(whose: str, *, points: bool = True, forces: bool = False) -> Legend:
+    """Returns what colours mean.
 
     Args:
         whose: whose points are shown, such as "plan".
         points: whether they are.
         forces: whether contact forces are shown.
     """
-    lines = []
+    rows = []
     if points:
         names = ("front toes", "rear toes", "withers and hip")
-        dots = [_dot(c, name) for c, name in zip(COLORS[::2], names, strict=True)]
-        lines.append(f"{escape(whose)}: {' '.join(dots)}")
+        rows.append(LegendRow(f"{whose}:", tuple(zip(COLORS[::2], names, strict=True))))
     if forces:
-        scale = f"1 cm for {FORCE_SCALE / 100:g} N"
-        lines.append(f"{_dot(FORCE_COLOR, 'contact forces')}, {scale}")
-    return "<br>".join(lines)
+        scale = f"contact forces, 1 cm for {FORCE_SCALE / 100:g} N"
+        rows.append(LegendRow("", ((FORCE_COLOR, scale),)))
+    return tuple(rows)
 
 
-def _dot(color: Rgba, text: str) -> str:
-    red, green, blue = (round(255 * part) for part in color.rgba[:3])
-    return _DOT.format(red, green, blue, text)
+def _row_html(row: LegendRow) -> str:
+    dots = [_DOT.format(*rgb(color), _safe(name)) for color, name in row.entries]
+    return " ".join(filter(None, [_safe(row.whose), *dots]))
 
 
-def _html(caption: Caption, legend: str) -> str:
+def _html(caption: Caption, legend: Legend) -> str:
     title = _TITLE.format(_MARKED if caption.marked else "", _safe(caption.title))
-    parts = [title, *map(_safe, caption.lines), *filter(None, [legend])]
+    parts = [title, *map(_safe, caption.lines), *map(_row_html, legend)]
     return "<br>".join(parts)
 
 

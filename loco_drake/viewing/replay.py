@@ -7,6 +7,7 @@ from pydrake.geometry import Meshcat
 from loco_drake.evaluation.tracking import FRAMES_PER_SECOND
 from loco_drake.models.scenery import publish_replay
 from loco_drake.viewing.captions import replay_corner
+from loco_drake.viewing.picture_text import write_caption
 from loco_drake.viewing.rendering import Camera, Picture
 from loco_drake.viewing.stage import Stage, viewpoint
 from loco_drake.viewing.takes import Scene, caption_of
@@ -36,16 +37,18 @@ def record(stage: Stage, meshcat: Meshcat) -> str:
 
 
 def pictures(scenes: Sequence[Scene], fps: float) -> Iterator[Picture]:
-    """Yields ``fps`` pictures a second of all scenes, one after another.
+    """Yields ``fps`` pictures a second of all scenes, one after another, with captions.
 
     Raises:
         OSError: if this machine cannot render.
     """
     stage = Stage(scenes, rendered=True)
     camera = Camera(*viewpoint(scenes))
-    for scene, time in frame_times(scenes, fps):
+    for number, (scene, time) in enumerate(frame_times(scenes, fps)):
         stage.set_up(scene, time)
-        yield camera.take(stage.query_object)
+        if time == 0 or number % _FRAMES_OF_CAPTION == 0:
+            caption = caption_of(stage.scenes, stage.scenes.index(scene), time)
+        yield write_caption(camera.take(stage.query_object), caption, stage.legend)
 
 
 def frame_times(scenes: Sequence[Scene], fps: float) -> list[tuple[Scene, float]]:

@@ -23,7 +23,7 @@ from pydrake.systems.framework import DiagramBuilder
 from loco_drake.common.arrays import Array
 from loco_drake.models.ground import FLOOR_Z, TILE, floor_mesh
 from loco_drake.systems.keypoint_visualizer import COLORS, NAMES, POINT
-from loco_drake.viewing.captions import legend
+from loco_drake.viewing.captions import Legend, legend
 from loco_drake.viewing.figure import AWAY, AddFigure, Figure, put_body
 from loco_drake.viewing.rendering import AddRenderEngine
 from loco_drake.viewing.takes import Scene
@@ -89,9 +89,9 @@ class Stage:
         self._query_context = scene_graph.GetMyContextFromRoot(self._context)
 
     @property
-    def legend(self) -> str:
-        """HTML that says what the colours of points mean, see :mod:`.captions`."""
-        return legend("recording", points=bool(self._points))
+    def legend(self) -> Legend:
+        """What the colours of points mean."""
+        return legend(self.scenes[0].whose, points=bool(self._points))
 
     @property
     def query_object(self) -> QueryObject:

@@ -19,7 +19,7 @@ from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.motion.momentum import positions
 from loco_drake.motion.motion import Motion
 from loco_drake.retargeting.scaling import resample
-from loco_drake.viewing.captions import Caption
+from loco_drake.viewing.captions import Caption, Track, caption_at
 
 # s around a time of which the speed is told, and after a change of gait in which it
 # stands out.
@@ -74,12 +74,16 @@ class Scene:
     # Where the middle of each take's lane is beside that of the scene, to the left, m.
     lanes: tuple[float, ...] = (0.0,)
     width: float = 0.0  # from the first lane's middle to the last's, m
+    track: Track = ()  # what is said instead of gait, time and speed
+    whose: str = "recording"  # points are shown
 
     def __len__(self) -> int:
         return round(self.duration * self.fps) + 1
 
     def caption(self, time: float) -> Caption:
         """Returns what there is to say at ``time`` in s, takes from right to left."""
+        if self.track:
+            return caption_at(self.track, time)
         gaits = [take.gait(time) for take in self.takes]
         names = [
             "  ".join(filter(None, (gait, take.title)))

@@ -210,6 +210,25 @@ def test_simulate_keeps_the_page_and_its_replay_until_ctrl_c(browser, look, tmp_
         process.stderr.close()
 
 
+def test_a_robot_far_from_the_origin_still_has_a_shadow(browser, picture, tmp_path):
+    """On a page whose camera stays, too."""
+    motion, page = tmp_path / "a.npz", tmp_path / "a.html"
+    save_motion(synthetic_motion(seconds=5.0, speed=1.4), motion)
+    line = ["simulate", "--no-meshcat", "--no-follow", "--reference", str(motion)]
+    assert main([*line, "--html", str(page)]) == 0
+    open_page(browser, page.as_uri())
+    browser.wait_for("globalThis.viewer?.animator.duration > 4")
+    browser.evaluate("viewer.animator.pause(); viewer.animator.seek(4.8)")
+    lit = picture()
+    plain = picture(f"{SUN}.castShadow = false")
+    shadow = (plain - lit).min(axis=-1) > 15
+    assert shadow.sum() > 30
+    # The picture shows the whole way, and at its end the robot and its shadow.
+    across = np.flatnonzero(shadow.any(axis=0))
+    assert SIZE[0] / 2 < np.median(across) < SIZE[0]
+    assert np.ptp(across) < SIZE[0] / 4
+
+
 def check_replay(browser):
     """It goes round as a whole, and the corner says what belongs to its time."""
     actions = "viewer.animator.actions"

@@ -21,6 +21,11 @@ def robot_columns(picture):
     return ((dark > 200) & ~sky).any(axis=0)
 
 
+def below_the_caption(picture):
+    """Returns what is below the text, whose legend has the colours of the plan."""
+    return picture[len(picture) // 4 :]
+
+
 def plan_pixels(picture):
     """Returns how many pixels are blue, red and green, as points of the plan are."""
     rgb = picture.astype(int)

@@ -1,7 +1,13 @@
 import pytest
 from pydrake.geometry import Meshcat
 
-from loco_drake.viewing.captions import Caption, PageText, legend, replay_corner
+from loco_drake.viewing.captions import (
+    Caption,
+    PageText,
+    caption_at,
+    legend,
+    replay_corner,
+)
 from tests.meshcat_messages import captions
 
 # Names that a file or a gait may have.
@@ -45,6 +51,25 @@ def test_a_replay_has_a_caption_for_each_time_and_is_safe(meshcat):
 
 
 def test_a_legend_names_what_is_shown():
-    assert legend("recording", points=False) == ""
-    assert "front toes" not in legend("plan", points=False, forces=True)
-    assert legend("<plan>").startswith("&lt;plan&gt;: ")
+    assert legend("recording", points=False) == ()
+    (forces,) = legend("plan", points=False, forces=True)
+    assert [name for _, name in forces.entries] == ["contact forces, 1 cm for 5 N"]
+    points, _ = legend("plan", forces=True)
+    names = [name for _, name in points.entries]
+    assert (points.whose, names) == (
+        "plan:",
+        ["front toes", "rear toes", "withers and hip"],
+    )
+
+
+def test_a_caption_is_shown_until_the_next():
+    track = [(0.0, Caption("a")), (0.5, Caption("b"))]
+    shown = [caption_at(track, time).title for time in (-1.0, 0.0, 0.48, 0.5, 9.0)]
+    assert shown == ["a", "a", "a", "b", "b"]
+
+
+def test_whose_points_they_are_is_safe(meshcat):
+    PageText(meshcat, legend(SPOILERS)).show(Caption("a"))
+    (name,) = meshcat.GetButtonNames()
+    assert "it&#x27;s &lt;b&gt;" in name
+    assert not set("'\\\n") & set(name)

@@ -8,12 +8,18 @@ import pytest
 from loco_drake.motion.motion import FPS
 from loco_drake.systems.keypoint_visualizer import keypoints
 from loco_drake.viewing import rendering
+from loco_drake.viewing.captions import Caption
 from loco_drake.viewing.rendering import HEIGHT, WIDTH, make_engine
 from loco_drake.viewing.replay import pictures
 from loco_drake.viewing.takes import Scene, Take, take_of_motion
 from tests.process import run_python
 from tests.synthetic_motion import synthetic_motion
-from tests.viewing.pictures import needs_renderer, plan_pixels, robot_columns
+from tests.viewing.pictures import (
+    below_the_caption,
+    needs_renderer,
+    plan_pixels,
+    robot_columns,
+)
 
 
 @needs_renderer
@@ -46,7 +52,27 @@ def test_the_plan_is_seen_beside_the_robot(go2):
     (alone,) = pictures([Scene((take,))], 1)
     (both,) = pictures([Scene((planned,))], 1)
     assert max(plan_pixels(alone)) < 10
-    assert min(plan_pixels(both)) > 100
+    assert min(plan_pixels(below_the_caption(both))) > 100
+
+
+@needs_renderer
+def test_pictures_say_what_they_show(go2):
+    """The time that stands on them changes, and a track of one's own replaces it."""
+    take = take_of_motion("a", synthetic_motion(seconds=0.8), go2)
+    corners = [ink(picture) for picture in pictures([Scene((take,))], 25)]
+    assert (corners[0] == corners[7]).all()
+    assert (corners[7] != corners[8]).any()
+    said = ((0.0, Caption("b")), (0.5, Caption("c", (), True)))
+    own = list(pictures([Scene((take,), track=said)], 25))
+    assert (ink(own[0]) != corners[0]).any()
+    assert (ink(own[0]) == ink(own[12])).all()
+    orange = (own[16][:60].astype(int)[..., 0] - own[16][:60, :, 2]) > 150
+    assert orange.sum() > 100
+
+
+def ink(picture):
+    """Returns where the text's dark ink is, above the floor and on it."""
+    return (picture[:60, :200] < 80).all(axis=-1)
 
 
 def test_a_machine_that_cannot_render_is_told_what_it_lacks(monkeypatch):
