@@ -34,7 +34,7 @@ def make_tiny_model(
         statistics = torch.randn(1000, SIZE) * 0.1
         statistics[:, JOINTS] += torch.tensor(get_robot("go2").stand_joints).float()
         statistics[:, 3] += 1.0
-        tokenizer.set_statistics(statistics)
+        tokenizer.set_statistics(statistics.mean(dim=0), statistics.std(dim=0))
         for _ in range(2):
             frames = statistics[torch.randint(1000, (16, 32))]
             learning(frames, torch.zeros(16, dtype=torch.long))

@@ -26,6 +26,7 @@ _COMMANDS = {
     "data list": "list the sources of motion and their licences",
     "data fetch": "download and check the recordings",
     "data inspect": "plot one stretch of a recording",
+    "data pack": "pack many Motion files in few large files",
     "robot inspect": "check a robot's file, and list what it is simulated with",
     "train tokenizer": "train the VQ-VAE that encodes motion",
     "train generator": "train the GPT that generates tokens",
@@ -112,7 +113,8 @@ def _run(arguments: list[str]) -> int:
     for option, kind in outputs(command).items():
         check_output(getattr(parsed, option), folder=kind is Output.FOLDER)
     # A recipe's options are in its folder, not in one checkpoint.
-    if getattr(parsed, "resume", False) and name != "train recipe":
+    with_checkpoint = name.startswith("train ") and name != "train recipe"
+    if with_checkpoint and getattr(parsed, "resume", False):
         from loco_drake.cli.training import parse_resumed
 
         parsed = parse_resumed(parsed, name, rest)

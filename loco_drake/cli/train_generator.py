@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from loco_drake.cli.options import MotionFolders, OutFolder, option
-from loco_drake.cli.training import Learned, NetworkTraining, Scores
+from loco_drake.cli.training import SCORED, Learned, NetworkTraining, Scores
 from loco_drake.common.errors import InputError, check_at_least
 
 if TYPE_CHECKING:
@@ -54,6 +54,7 @@ class TrainGenerator(NetworkTraining):
 
     def learn(self) -> Learned:
         """Trains a generator for the labels of the motions, or teaches one."""
+        from loco_drake.generation.clips import evenly
         from loco_drake.generation.tokenizer import load_tokenizer
         from loco_drake.generation.train_generator import (
             score_generator,
@@ -62,7 +63,7 @@ class TrainGenerator(NetworkTraining):
         from loco_drake.generation.train_telling import train_telling
         from loco_drake.generation.training_motions import load_library
 
-        library = load_library(*self.motions)
+        library = load_library(*self.motions, scratch=self.scratch)
         tokenizer = load_tokenizer(self.tokenizer)
         if self.tell is not None:
             generator, result = train_telling(
@@ -77,7 +78,7 @@ class TrainGenerator(NetworkTraining):
         def score() -> Scores:
             figures = {"steps": result.steps, "wall_clock_s": result.seconds}
             for name in ("train", "held_out"):
-                if clips := getattr(library, name):
+                if clips := evenly(getattr(library, name), SCORED):
                     nats = score_generator(generator, tokenizer, clips)
                     figures[f"{name}_nats_per_code"] = nats
                     if self.tell is not None:

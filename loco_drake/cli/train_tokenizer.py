@@ -1,11 +1,12 @@
 """The command ``train tokenizer``."""
 
 from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from loco_drake.cli.options import MotionFolders, OutFolder, option
-from loco_drake.cli.training import Learned, NetworkTraining, Scores
+from loco_drake.cli.training import SCORED, Learned, NetworkTraining, Scores
 
 
 @dataclass(kw_only=True)
@@ -34,6 +35,7 @@ class TrainTokenizer(NetworkTraining):
 
     def learn(self) -> Learned:
         """Trains a tokenizer for the robots of the motions."""
+        from loco_drake.generation.clips import evenly
         from loco_drake.generation.tokenizer import TokenizerConfig
         from loco_drake.generation.tokenizer_score import codebook_use, score_tokenizer
         from loco_drake.generation.train_bodies import train_bodies
@@ -41,7 +43,7 @@ class TrainTokenizer(NetworkTraining):
         from loco_drake.generation.training_motions import load_library
         from loco_drake.models.shipped import pretrained_path
 
-        library = load_library(*self.motions)
+        library = load_library(*self.motions, scratch=self.scratch)
         if self.add_to is None:
             config = TokenizerConfig(robots=library.robots)
             tokenizer, result = train_tokenizer(library, config, self)
@@ -51,11 +53,15 @@ class TrainTokenizer(NetworkTraining):
             tokenizer, result = train_bodies(library, base, self)
 
         def score() -> Scores:
-            used = codebook_use(tokenizer, library.train + library.held_out)
+            sides = {
+                "train": evenly(library.train, SCORED),
+                "held_out": evenly(library.held_out, SCORED),
+            }
+            used = codebook_use(tokenizer, chain(*sides.values()))
             figures: dict[str, Any] = {"codebook_use": used}
             rows = []
-            for name in ("train", "held_out"):
-                if clips := getattr(library, name):
+            for name, clips in sides.items():
+                if clips:
                     found = score_tokenizer(tokenizer, clips)
                     figures[name] = asdict(found)
                     toes = f"{found.toe_error_rmse_m * 1000:.1f}"

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from loco_drake.control.plan import Plan
     from loco_drake.generation.training import LoopResult
 
+SCORED = 2000  # clips of a library that a network is scored on, at most
 # Options that are not the run's: where it is, and what a call does.
 _OF_THE_CALL = ("out", "resume", "json", "start_from")
 # Where it learned from may be elsewhere now: what is there is compared.
@@ -80,6 +82,11 @@ class NetworkTraining(LoopSettings):
             lambda: write_json(self.json, {**training, **scores.figures}),
         )
         return 0
+
+    @property
+    def scratch(self) -> Path:
+        """A folder that exists, on the disk that the run will be on."""
+        return next(path for path in (self.out, *self.out.parents) if path.is_dir())
 
     def learn(self) -> Learned:
         """Reads the motions and trains."""

@@ -1,6 +1,6 @@
 """Recorded motion of a robot as reference, split into training and validation sets."""
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -14,7 +14,7 @@ from loco_drake.evaluation.samples import by_label, cut, labels_of
 from loco_drake.models.robots import Robot, get_robot
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import FPS, Motion
-from loco_drake.motion.motion_file import load_motion
+from loco_drake.motion.motion_folder import open_motions
 from loco_drake.retargeting.retarget import SegmentRetargeter
 from loco_drake.retargeting.scaling import Variant
 
@@ -80,10 +80,6 @@ def by_split(
     return Recorded(tuple(sides[False]), tuple(sides[True]), failed or {})
 
 
-def _load(folder: Path) -> Iterator[Motion]:
-    return map(load_motion, sorted(Path(folder).rglob("*.npz")))
-
-
 def load_to_score(
     folder: Path, robot: Robot, labels: Collection[str] = ()
 ) -> list[Motion]:
@@ -94,7 +90,7 @@ def load_to_score(
     """
     motions = [
         motion
-        for motion in _load(folder)
+        for motion in open_motions(folder)
         if motion.robot == robot.name and (not labels or str(motion.label) in labels)
     ]
     if not motions:
@@ -120,7 +116,7 @@ def load_recorded(folder: Path) -> tuple[Robot, Recorded]:
     Raises:
         InputError: if there are none, or of several robots, or one is unsound.
     """
-    motions = [motion for motion in _load(folder) if motion.label in LABELS]
+    motions = [motion for motion in open_motions(folder) if motion.label in LABELS]
     robots = sorted({motion.robot for motion in motions})
     if len(robots) != 1:
         found = f"of {', '.join(robots)}" if robots else "none"

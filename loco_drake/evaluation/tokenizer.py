@@ -21,10 +21,11 @@ from loco_drake.common.arrays import Integers
 from loco_drake.common.determinism import single_thread
 from loco_drake.evaluation.recorded import Recorded
 from loco_drake.evaluation.samples import subject_of
+from loco_drake.generation.clips import Clip
 from loco_drake.generation.features import JOINTS, motion_features
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.tokenizer_score import code_counts, score_tokenizer
-from loco_drake.generation.training_motions import Clip, motion_clip
+from loco_drake.generation.training_motions import motion_clip
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import Motion

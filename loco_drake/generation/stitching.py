@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.signal import convolve
 
 from loco_drake.common.errors import InputError
+from loco_drake.generation.clips import Chosen, Clip
 from loco_drake.generation.features import CONTACTS, JOINTS
-from loco_drake.generation.training_motions import Clip
 from loco_drake.motion.motion import FPS
 
 Array = NDArray[np.float64]
@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 STRIDE = 25  # frames over which pace is averaged
 BLEND = 8  # frames in which one clip goes over into another
 SHORTEST_STAY = 20  # frames in a clip between two blends
+SHORTEST = 2 * BLEND + SHORTEST_STAY  # frames; shorter clips cannot be used
+# Frames among which a transition is sought, at most; no recorded gait has more.
+POOL = 2**16
 EXITS = 10  # frames before and after the wished-for one at which a clip may be left
 GREED = 0.1  # spread of the costs among which a transition is drawn
 TO_THE_END = 0.7  # probability of staying in a clip to its end
@@ -34,17 +37,17 @@ class Stitcher:
 
     It counts how often each frame was used and prefers others. Otherwise clips that
     slow down would lead to ever slower ones, where all motion would end. Clips of up to
-    2 BLEND + SHORTEST_STAY frames are left out.
+    SHORTEST frames are left out.
 
     Raises:
         InputError: if all clips are too short.
     """
 
     def __init__(self, clips: Sequence[Clip]) -> None:
-        self._clips = [c.features for c in clips if len(c) > 2 * BLEND + SHORTEST_STAY]
+        self._clips = [c.features for c in clips if len(c) > SHORTEST]
         if not self._clips:
             raise InputError(
-                f"A generator needs clips of more than {2 * BLEND + SHORTEST_STAY} "
+                f"A generator needs clips of more than {SHORTEST} "
                 f"frames of each label; those of {clips[0].label} are shorter."
             )
         # A frame is described by pose and speeds, in standard deviations.
@@ -56,7 +59,7 @@ class Stitcher:
         self._clip_of = np.repeat(np.arange(len(lengths)), lengths)
         self._frame_of = np.concatenate([np.arange(n) for n in lengths])
         left = np.repeat(lengths, lengths) - self._frame_of
-        self._enterable = np.flatnonzero(left > 2 * BLEND + SHORTEST_STAY)
+        self._enterable = np.flatnonzero(left > SHORTEST)
         self._played = np.zeros(len(described))  # how often each frame was, so far
 
     def __call__(self, frames: int, random: np.random.Generator) -> Array:
@@ -113,6 +116,20 @@ class Stitcher:
         choice = random.choice(len(odds), p=odds / odds.sum())
         exit_index, target = divmod(int(choice), len(self._enterable))
         return int(exits[exit_index]), int(self._enterable[target])
+
+
+def pools(clips: Sequence[Clip], random: np.random.Generator) -> list[Sequence[Clip]]:
+    """Returns clips of one robot and label in pools of about POOL frames or less.
+
+    All in one if they are few, else those that can be used, shuffled.
+    """
+    lengths = np.fromiter((len(clip) for clip in clips), np.int64, len(clips))
+    if lengths.sum() <= POOL or lengths.max() <= SHORTEST:
+        return [clips]
+    rows = random.permutation(np.flatnonzero(lengths > SHORTEST))
+    ends = np.cumsum(lengths[rows])
+    cuts = np.flatnonzero(np.diff((ends - 1) // POOL)) + 1
+    return [Chosen(clips, part) for part in np.split(rows, cuts)]
 
 
 def _described(clip: Array) -> Array:

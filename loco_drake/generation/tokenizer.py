@@ -119,11 +119,11 @@ class Tokenizer(nn.Module):
             sum(block.reach for block in smooth) / frames
         )
 
-    def set_statistics(self, features: Tensor) -> None:
-        """Sets mean and deviation for normalization from features (N, SIZE)."""
-        self.mean.copy_(features.mean(dim=0))
+    def set_statistics(self, mean: Tensor, std: Tensor) -> None:
+        """Sets mean and deviation for normalization, those of features (SIZE,)."""
+        self.mean.copy_(mean)
         # Do not amplify features that hardly vary.
-        self.std.copy_(features.std(dim=0).clamp(min=0.02))
+        self.std.copy_(std.clamp(min=0.02))
         self.mean[CONTACTS], self.std[CONTACTS] = 0.5, 0.5
 
     def embed(self, features: Tensor, robot: Tensor) -> Tensor:

@@ -1,6 +1,6 @@
 """Reconstruction errors and codebook usage of a tokenizer."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +9,8 @@ from torch import Tensor
 
 from loco_drake.common.determinism import single_thread
 from loco_drake.generation import features as ft
+from loco_drake.generation.clips import Clip
 from loco_drake.generation.tokenizer import Tokenizer
-from loco_drake.generation.training_motions import Clip
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion import FPS
 
@@ -112,7 +112,7 @@ def score_tokenizer(
     )
 
 
-def code_counts(tokenizer: Tokenizer, clips: Sequence[Clip]) -> Tensor:
+def code_counts(tokenizer: Tokenizer, clips: Iterable[Clip]) -> Tensor:
     """Returns how often each code is used, shape (codebooks, codebook_size)."""
     config = tokenizer.config
     counts = torch.zeros(config.codebooks, config.codebook_size, dtype=torch.long)
@@ -122,7 +122,7 @@ def code_counts(tokenizer: Tokenizer, clips: Sequence[Clip]) -> Tensor:
     return counts
 
 
-def codebook_use(tokenizer: Tokenizer, clips: Sequence[Clip]) -> float:
+def codebook_use(tokenizer: Tokenizer, clips: Iterable[Clip]) -> float:
     """Returns the share of all codebooks' codes that the clips need, in [0, 1]."""
     return float((code_counts(tokenizer, clips) > 0).float().mean())
 

@@ -34,7 +34,7 @@ from loco_drake.generation.training_motions import (
     read_training_record,
     training_record,
 )
-from loco_drake.generation.windows import WINDOW, PairedWindows
+from loco_drake.generation.windows import PairedWindows, long_enough
 
 
 class _Rows(nn.Module):
@@ -70,9 +70,7 @@ def train_bodies(
             tokenizer cannot be read.
     """
     base = load_tokenizer(path)
-    clips = [clip for clip in library.train if len(clip) >= WINDOW]
-    if not clips:
-        raise InputError(f"No motion to train on is at least {WINDOW} frames long.")
+    clips = long_enough(library.train)
     known = base.config.robots
     names = tuple(name for name in library.robots if name not in known)
     if not names:

@@ -1,7 +1,8 @@
 """Training of the generator on the tokens of clips."""
 
-from collections import defaultdict
-from collections.abc import Sequence
+from array import array
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from loco_drake.common.determinism import single_thread
 from loco_drake.common.device import find_device
 from loco_drake.common.errors import InputError
 from loco_drake.common.weights import save_network
-from loco_drake.generation import speed_rank
+from loco_drake.generation import speed_rank, stitching
+from loco_drake.generation.clips import Chosen, Clip
 from loco_drake.generation.generator import (
     LONGEST,
     Generator,
@@ -23,12 +25,11 @@ from loco_drake.generation.generator import (
     duration_bin,
 )
 from loco_drake.generation.loop_settings import LoopSettings
-from loco_drake.generation.stitching import Stitcher
 from loco_drake.generation.telling import AXES, token_velocities
 from loco_drake.generation.tokenizer import Tokenizer
 from loco_drake.generation.tokenizer_score import encode_clip
 from loco_drake.generation.training import LoopResult, train
-from loco_drake.generation.training_motions import Clip, Library, training_record
+from loco_drake.generation.training_motions import Library, training_record
 from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.motion import FPS
 
@@ -57,7 +58,7 @@ class Codes:
 
 
 def encode_clips(
-    tokenizer: Tokenizer, clips: Sequence[Clip], codebooks: int
+    tokenizer: Tokenizer, clips: Iterable[Clip], codebooks: int
 ) -> list[Codes]:
     """Returns the tokens of each clip, the first ``codebooks`` codes of each."""
     encoded = []
@@ -71,8 +72,8 @@ def encode_clips(
     return encoded
 
 
-def stitched_clips(clips: Sequence[Clip], count: int, seed: int) -> list[Clip]:
-    """Returns long motions assembled from the clips.
+def stitched_clips(clips: Sequence[Clip], count: int, seed: int) -> Iterator[Clip]:
+    """Yields long motions assembled from the clips.
 
     There are ``count`` on average per robot and label; their number is proportional to
     the square root of the duration of its clips, since gaits with more recordings are
@@ -82,18 +83,22 @@ def stitched_clips(clips: Sequence[Clip], count: int, seed: int) -> list[Clip]:
         InputError: if all clips of a robot and label are too short.
     """
     random = np.random.default_rng(seed)
-    groups: dict[tuple[str, GaitLabel], list[Clip]] = defaultdict(list)
-    for clip in clips:
-        groups[clip.robot, clip.label].append(clip)
-    roots = {key: sum(map(len, group)) ** 0.5 for key, group in groups.items()}
+    groups: dict[tuple[str, GaitLabel], array[int]] = defaultdict(lambda: array("q"))
+    frames: Counter[tuple[str, GaitLabel]] = Counter()
+    for row, clip in enumerate(clips):
+        groups[clip.robot, clip.label].append(row)
+        frames[clip.robot, clip.label] += len(clip)
+    roots = {key: frames[key] ** 0.5 for key in groups}
     mean = sum(roots.values()) / len(roots)
-    stitched = []
-    for (robot, label), group in sorted(groups.items()):
-        stitcher = Stitcher(group)
-        for _ in range(max(1, round(count * roots[robot, label] / mean))):
-            features = stitcher(round(STITCHED_SECONDS * FPS), random)
-            stitched.append(Clip(robot, label, "stitched", features))
-    return stitched
+    for (robot, label), rows in sorted(groups.items()):
+        number = max(1, round(count * roots[robot, label] / mean))
+        pools = stitching.pools(Chosen(clips, rows), random)
+        # The first ones make one motion more, if need be.
+        for index, pool in enumerate(pools[:number]):
+            stitcher = stitching.Stitcher(pool)
+            for _ in range(index, number, len(pools)):
+                features = stitcher(round(STITCHED_SECONDS * FPS), random)
+                yield Clip(robot, label, "stitched", features)
 
 
 def train_generator(

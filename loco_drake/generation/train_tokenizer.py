@@ -8,6 +8,7 @@ so that the decoder can use the coarse ones alone.
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -20,17 +21,19 @@ from vector_quantize_pytorch import ResidualVQ
 from loco_drake.common.device import find_device
 from loco_drake.common.errors import InputError
 from loco_drake.common.weights import save_network
+from loco_drake.generation.clips import Chosen, Clip, in_parts
 from loco_drake.generation.features import CONTACTS
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.point_masses import PointMasses
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig
 from loco_drake.generation.tokenizer_score import Toes
 from loco_drake.generation.training import LoopResult, train
-from loco_drake.generation.training_motions import Clip, Library, training_record
-from loco_drake.generation.windows import WINDOW, PairedWindows
+from loco_drake.generation.training_motions import Library, training_record
+from loco_drake.generation.windows import PairedWindows, long_enough
 from loco_drake.motion.gaits import LABELS
 
 Array = NDArray[np.float64]
+Moments = tuple[int, Array, Array]  # number of rows, their mean and their variance
 
 BATCH = 32  # windows
 # Batches are decoded from between so many and all of the codebooks.
@@ -68,10 +71,12 @@ class Scales:
     def __init__(
         self, clips: Sequence[Clip], device: torch.device | str = "cpu"
     ) -> None:
-        by_label: dict[int, list[Array]] = defaultdict(list)
-        for clip in clips:
-            by_label[clip.label.index].append(clip.features[:, : CONTACTS.start])
-        own = {label: _variances(features) for label, features in by_label.items()}
+        by_label: dict[int, list[int]] = defaultdict(list)
+        for row, clip in enumerate(clips):
+            by_label[clip.label.index].append(row)
+        own = {
+            label: _variances(Chosen(clips, rows)) for label, rows in by_label.items()
+        }
         everything: Array = np.mean(list(own.values()), axis=0)
         table = np.stack([own.get(i, everything) for i in range(len(LABELS))])
         # Do not amplify features that hardly vary.
@@ -86,11 +91,48 @@ class Scales:
         return deviation, change, jitter
 
 
-def _variances(clips: Sequence[Array]) -> Array:
+def _variances(clips: Sequence[Clip]) -> Array:
     """Returns variances and mean squared first and second differences, (3, N)."""
-    orders = [np.concatenate([np.diff(x, n=n, axis=0) for x in clips]) for n in (1, 2)]
-    squares = [np.square(order).mean(axis=0) for order in orders]
-    return np.stack((np.concatenate(clips).var(axis=0), *squares))
+    orders = []
+    for part in in_parts(clips):
+        values = [clip.features[:, : CONTACTS.start] for clip in part]
+        frames = np.concatenate(values)
+        found = [(len(frames), frames.mean(axis=0), frames.var(axis=0))]
+        for n in (1, 2):
+            changes = np.concatenate([np.diff(x, n=n, axis=0) for x in values])
+            square = np.square(changes).mean(axis=0)
+            found.append((len(changes), np.zeros_like(square), square))
+        orders.append(found)
+    together = (reduce(_together, order) for order in zip(*orders, strict=True))
+    return np.stack([variance for _, _, variance in together])
+
+
+def _together(a: Moments, b: Moments) -> Moments:
+    """Returns number, mean and variance of two sets of rows together."""
+    (n, mean_a, variance_a), (m, mean_b, variance_b) = a, b
+    share = m / (n + m)
+    apart = mean_b - mean_a
+    variance = (1 - share) * variance_a + share * variance_b
+    variance = variance + share * (1 - share) * np.square(apart)
+    return n + m, mean_a + share * apart, variance
+
+
+def statistics(clips: Sequence[Clip]) -> tuple[Tensor, Tensor]:
+    """Returns mean and standard deviation of the features of clips, (SIZE,) each."""
+    parts = []
+    for part in in_parts(clips):
+        frames = np.concatenate([clip.features for clip in part])
+        rows = torch.tensor(frames, dtype=torch.float32)
+        parts.append((rows.mean(dim=0), rows.std(dim=0), len(rows)))
+    mean, std, _ = parts[0]
+    if len(parts) > 1:
+        moments = (
+            (n, mean.double().numpy(), np.square(std.double().numpy()))
+            for mean, std, n in parts
+        )
+        _, means, variances = reduce(_together, moments)
+        mean, std = (torch.from_numpy(x).float() for x in (means, np.sqrt(variances)))
+    return mean, std
 
 
 class LearningTokenizer(nn.Module):
@@ -143,9 +185,7 @@ def train_tokenizer(
         InputError: if no clip is as long as a window, or a robot of the library is
             not in the config.
     """
-    clips = [clip for clip in library.train if len(clip) >= WINDOW]
-    if not clips:
-        raise InputError(f"No motion to train on is at least {WINDOW} frames long.")
+    clips = long_enough(library.train)
     missing = sorted(set(library.robots) - set(config.robots))
     if missing:
         raise InputError(f"The tokenizer is not to know {', '.join(missing)}.")
@@ -155,8 +195,7 @@ def train_tokenizer(
     with torch.no_grad():
         # Start with constant output: unlearning initial jitter would kill most codes.
         learning.tokenizer.decoder_out.weight.mul_(0.01)
-    frames = np.concatenate([clip.features for clip in clips])
-    learning.tokenizer.set_statistics(torch.tensor(frames, dtype=torch.float32))
+    learning.tokenizer.set_statistics(*statistics(clips))
     device = find_device(settings.device)
     toes = Toes(config.robots, device)
     masses = PointMasses(config.robots, device)

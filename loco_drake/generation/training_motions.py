@@ -1,8 +1,11 @@
 """Motion files as training data."""
 
+from array import array
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
@@ -11,107 +14,100 @@ from numpy.typing import NDArray
 
 from loco_drake import __version__
 from loco_drake.common.errors import InputError
+from loco_drake.common.progress import progress_bar
 from loco_drake.common.weights import load_weights
 from loco_drake.datasets.split import VALIDATION
+from loco_drake.generation.clips import Chosen, Clip, ClipFile
 from loco_drake.generation.features import motion_features
 from loco_drake.generation.loop_settings import RUN_SETTINGS, LoopSettings
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS, GaitLabel
 from loco_drake.motion.motion import FPS, Motion
-from loco_drake.motion.motion_file import load_motion
+from loco_drake.motion.motion_folder import open_motions
 
 Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True, eq=False)
-class Clip:
-    """One stretch of motion as features, or its mirror image."""
-
-    robot: str  # its name
-    label: GaitLabel
-    # Source and animal, or file of an unknown animal. Clips of one may overlap.
-    recording: str
-    features: Array  # see features.py, (T, SIZE)
-    # File, frames and mirroring: the same for all robots; empty if unknown.
-    performance: str = ""
-    grounded: bool = False  # whether it was made to obey physics
-
-    def __len__(self) -> int:
-        return len(self.features)
+# What in the provenance tells performances apart.
+_PERFORMANCE = ("file", "frames", "mirrored", "steered")
 
 
 @dataclass(frozen=True)
 class Library:
     """Clips for training and testing, split by recording."""
 
-    train: tuple[Clip, ...]  # clips, then their mirror images
-    held_out: tuple[Clip, ...]  # not mirrored, of recordings that are not in ``train``
+    train: Sequence[Clip]  # clips, then their mirror images
+    held_out: Sequence[Clip]  # not mirrored, of recordings that are not in ``train``
 
-    @property
+    @cached_property
     def labels(self) -> tuple[GaitLabel, ...]:
         """The labels in ``train``, in the order of gaits.LABELS."""
         present = {clip.label for clip in self.train}
         return tuple(label for label in LABELS if label in present)
 
-    @property
+    @cached_property
     def grounded(self) -> bool:
         """Whether all motion in ``train`` was made to obey physics."""
         return all(clip.grounded for clip in self.train)
 
-    @property
+    @cached_property
     def robots(self) -> tuple[str, ...]:
         """The robots in ``train``, sorted by name."""
         return tuple(sorted({clip.robot for clip in self.train}))
 
-    @property
+    @cached_property
     def summary(self) -> str:
         """Size of the training data, which identifies the library."""
         frames = sum(len(clip) for clip in self.train)
         return f"{len(self.train)} clips of {frames} frames"
 
 
-def load_library(*folders: Path) -> Library:
-    """Reads every Motion file ``*.npz`` with one of the fifteen labels in the folders.
+def load_library(*folders: Path, scratch: Path | None = None) -> Library:
+    """Reads every motion with one of the fifteen labels in the folders.
 
     The split is the one that ``loco-drake retarget`` wrote into the files
-    (:mod:`loco_drake.datasets.split`); motions without one are for training.
+    (:mod:`loco_drake.datasets.split`); motions without one are for training. Their
+    features are in a file without a name in ``scratch``, see :class:`.ClipFile`.
 
     Raises:
         InputError: if there are no motions with a label to train on, one is unsound, or
             a recording is on both sides of the split.
     """
     where = ", ".join(repr(str(folder)) for folder in folders)
-    for folder in folders:
-        if not Path(folder).is_dir():
-            raise InputError(f"There is no folder of Motion files {str(folder)!r}.")
-    paths = [path for folder in folders for path in sorted(folder.rglob("*.npz"))]
-    loaded = ((path, load_motion(path)) for path in paths)
-    motions = [(path, motion) for path, motion in loaded if motion.label in LABELS]
-    if not motions:
+    opened = [open_motions(folder) for folder in folders]
+    clips = ClipFile(scratch)
+    train, mirrors, held_out = (array("q") for _ in range(3))
+    subjects: tuple[set[str], set[str]] = (set(), set())
+    with progress_bar() as progress:
+        bar = progress.add_task("Reading", total=sum(map(len, opened)), note="")
+        for motions in opened:
+            for number, motion in enumerate(motions):
+                progress.advance(bar)
+                if motion.label not in LABELS:
+                    continue
+                validation = motion.provenance.get("split") == VALIDATION
+                (held_out if validation else train).append(len(clips))
+                try:
+                    clip = motion_clip(motion, path := motions.path(number))
+                except InputError as error:
+                    raise InputError(f"{path}: {error}") from None
+                clips.append(clip)
+                subjects[validation].add(clip.recording)
+                if not validation:
+                    mirrors.append(len(clips))
+                    clips.append(motion_clip(motion.mirrored(), path))
+    if not len(clips):
         raise InputError(
             f"There are no Motion files (*.npz) with one of the labels "
             f"{', '.join(map(str, LABELS))} in {where}."
         )
-    train, mirrors, held_out = [], [], []
-    for path, motion in motions:
-        try:
-            clip = motion_clip(motion, str(path))
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
-        if motion.provenance.get("split") == VALIDATION:
-            held_out.append(clip)
-        else:
-            train.append(clip)
-            mirrors.append(motion_clip(motion.mirrored(), str(path)))
     if not train:
         raise InputError(f"All motions in {where} are for validation.")
-    both = {clip.recording for clip in train} & {clip.recording for clip in held_out}
-    if both:
+    if both := subjects[0] & subjects[1]:
         raise InputError(
             f"Motions of {min(both)} in {where} are for training and for "
             "validation: retarget all of them with the same --seed."
         )
-    return Library(train=(*train, *mirrors), held_out=tuple(held_out))
+    return Library(Chosen(clips, train + mirrors), Chosen(clips, held_out))
 
 
 def motion_clip(motion: Motion, path: str = "") -> Clip:
@@ -119,8 +115,9 @@ def motion_clip(motion: Motion, path: str = "") -> Clip:
     origin = motion.provenance
     performance = ""
     if "file" in origin and "frames" in origin:
-        parts = (origin["file"], origin["frames"], origin.get("mirrored", ""))
-        performance = " ".join((str(motion.label), *parts))
+        parts = (str(motion.label), *(origin.get(name, "") for name in _PERFORMANCE))
+        text = " ".join(parts).encode()
+        performance = blake2b(text, digest_size=8).hexdigest()
     return Clip(
         robot=motion.robot,
         label=motion.label,

@@ -1,6 +1,7 @@
 """Windows of clips for training the tokenizer."""
 
-from collections import defaultdict
+from array import array
+from collections import OrderedDict
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,10 +10,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from torch import Tensor
 
+from loco_drake.common.errors import InputError
+from loco_drake.generation.clips import HELD_FRAMES, Chosen, Clip
 from loco_drake.generation.features import CONTACTS, VELOCITY, YAW_RATE
-from loco_drake.generation.training_motions import Clip, clip_probabilities
+from loco_drake.generation.training_motions import clip_probabilities
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 WINDOW = 64  # frames
 TEMPO = 1.15  # largest change of speed of a window
@@ -33,18 +37,23 @@ class PairedWindows:
         self._clips = clips
         self._robots = robots
         self._probabilities = clip_probabilities(clips)
-        self._curves = {
-            clip: CubicSpline(np.arange(len(clip)), clip.features) for clip in clips
-        }
-        together: dict[str, list[Clip]] = defaultdict(list)
-        for clip in clips:
+        self._curve = _Curves()
+        # Clips in the order of their performances, the same ones beside each other.
+        count = len(clips)
+        self._known = np.zeros(count, dtype=bool)
+        self._performance = np.zeros(count, dtype=np.uint64)
+        self._robot = np.zeros(count, dtype=np.int16)
+        for row, clip in enumerate(clips):
+            self._robot[row] = robots.index(clip.robot)
             if clip.performance:
-                together[clip.performance].append(clip)
-        self._others = {
-            clip: [c for c in together[clip.performance] if c.robot != clip.robot]
-            for clip in clips
-        }
-        self._paired = any(self._others.values())
+                self._known[row] = True
+                self._performance[row] = int(clip.performance, 16)
+        rows = np.flatnonzero(self._known)
+        self._rows = rows[np.argsort(self._performance[rows], kind="stable")]
+        self._sorted = self._performance[self._rows]
+        robot = self._robot[self._rows]
+        same = self._sorted[1:] == self._sorted[:-1]
+        self._paired = bool((same & (robot[1:] != robot[:-1])).any())
 
     def __call__(
         self, random: np.random.Generator, count: int
@@ -55,21 +64,65 @@ class PairedWindows:
         are clips of several robots: the second half are the same windows of others.
         """
         drawn = random.choice(len(self._clips), size=count, p=self._probabilities)
-        chosen = [self._clips[i] for i in drawn]
-        cuts = [draw_cut(len(clip), random) for clip in chosen]
+        chosen = [(int(row), self._clips[row]) for row in drawn]
+        cuts = [draw_cut(len(clip), random) for _, clip in chosen]
         if self._paired:
-            others = [self._others[clip] or [clip] for clip in chosen]
-            chosen += [among[random.integers(len(among))] for among in others]
+            others = [self._others(row) for row, _ in chosen]
+            rows = [int(among[random.integers(len(among))]) for among in others]
+            chosen += [(row, self._clips[row]) for row in rows]
             cuts += cuts
         frames = [
-            cut_window(self._curves[clip], *cut)
-            for clip, cut in zip(chosen, cuts, strict=True)
+            cut_window(self._curve(row, clip), *cut)
+            for (row, clip), cut in zip(chosen, cuts, strict=True)
         ]
         return (
             torch.tensor(np.stack(frames), dtype=torch.float32),
-            torch.tensor([self._robots.index(clip.robot) for clip in chosen]),
-            torch.tensor([clip.label.index for clip in chosen]),
+            torch.tensor([self._robots.index(clip.robot) for _, clip in chosen]),
+            torch.tensor([clip.label.index for _, clip in chosen]),
         )
+
+    def _others(self, row: int) -> Integers:
+        """Returns the clips of other robots that are the same as one, or this one."""
+        first, end = (
+            np.searchsorted(self._sorted, self._performance[row], side=side)
+            for side in ("left", "right")
+        )
+        same = self._rows[first:end] if self._known[row] else self._rows[:0]
+        others = same[self._robot[same] != self._robot[row]]
+        return others if len(others) else np.array([row])
+
+
+class _Curves:
+    """Curves through the clips, of which those that were used last are kept."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[int, CubicSpline] = OrderedDict()
+        self._frames = 0
+
+    def __call__(self, row: int, clip: Clip) -> CubicSpline:
+        """Returns the curve of clip number ``row``."""
+        if row in self._kept:
+            self._kept.move_to_end(row)
+            return self._kept[row]
+        curve = CubicSpline(np.arange(len(clip)), clip.features)
+        self._kept[row] = curve
+        self._frames += len(clip)
+        while self._frames > HELD_FRAMES and len(self._kept) > 1:
+            _, oldest = self._kept.popitem(last=False)
+            self._frames -= len(oldest.x)
+        return curve
+
+
+def long_enough(clips: Sequence[Clip]) -> Sequence[Clip]:
+    """Returns the clips that hold a window.
+
+    Raises:
+        InputError: if there are none.
+    """
+    rows = array("q", (i for i, clip in enumerate(clips) if len(clip) >= WINDOW))
+    if not rows:
+        raise InputError(f"No motion to train on is at least {WINDOW} frames long.")
+    return Chosen(clips, rows)
 
 
 def draw_cut(frames: int, random: np.random.Generator) -> tuple[float, float]:

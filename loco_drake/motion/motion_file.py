@@ -7,7 +7,7 @@ import sys
 import warnings
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.lib import format as npy
@@ -63,14 +63,29 @@ def motion_bytes(motion: Motion) -> bytes:
 def load_motion(path: Path) -> Motion:
     """Reads a Motion file and checks it; all commands and functions use this reader.
 
+    See :func:`parse_motion`.
+
+    Raises:
+        InputError: as there, or if there is no such file.
+    """
+    return _load(Path(path), str(path))
+
+
+def parse_motion(content: bytes, name: str) -> Motion:
+    """Returns the motion of a file's content, checked; ``name`` is that in messages.
+
     Joints in another order than the robot's are reordered, which is reported on stderr
     and in the provenance. So are, on stderr only, velocities in a file without a hash
     that differ from the derivatives of the positions.
 
     Raises:
-        InputError: if the file is missing, damaged, of a newer schema, or fails a
-            check of :class:`Motion` or :func:`.conventions.check_conventions`.
+        InputError: if the content is damaged, of a newer schema, or fails a check of
+            :class:`Motion` or :func:`.conventions.check_conventions`.
     """
+    return _load(io.BytesIO(content), name)
+
+
+def _load(source: Path | io.BytesIO, name: str) -> Motion:
     # It imports Drake, which --help and writers do not need.
     from loco_drake.motion.conventions import (
         check_conventions,
@@ -78,11 +93,10 @@ def load_motion(path: Path) -> Motion:
         velocity_deviations,
     )
 
-    path = Path(path)
     try:
-        if not path.is_file():
-            raise InputError(f"There is no Motion file {str(path)!r}.")
-        header, arrays = _read(path)
+        if isinstance(source, Path) and not source.is_file():
+            raise InputError(f"There is no Motion file {name!r}.")
+        header, arrays = _read(source)
         claimed = header.pop("content_sha256", None)
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused
             motion = _make(header, arrays)
@@ -90,31 +104,38 @@ def load_motion(path: Path) -> Motion:
                 raise InputError("It is damaged: its content does not match its hash.")
             check_conventions(ordered := in_robot_order(motion))
     except InputError as error:
-        named = str(path) in str(error)
-        raise InputError(str(error) if named else f"{path}: {error}") from None
+        named = name in str(error)
+        raise InputError(str(error) if named else f"{name}: {error}") from None
     except Exception:  # zipfile, numpy and json raise many kinds
         raise InputError(
-            f"{path} is not a Motion file: it must be an .npz with a JSON header."
+            f"{name} is not a Motion file: it must be an .npz with a JSON header."
         ) from None
     if ordered is not motion:
-        text = f"{path}: joints {ordered.provenance['joints']}."
+        text = f"{name}: joints {ordered.provenance['joints']}."
         print(one_line(text), file=sys.stderr)
     deviations = velocity_deviations(ordered) if claimed is None else {}
     if deviations:
-        worst = ", ".join(f"{name} by {off:.0%}" for name, off in deviations.items())
+        worst = ", ".join(f"{key} by {off:.0%}" for key, off in deviations.items())
         text = (
-            f"{path} has no hash, and velocities differ from the derivatives of the "
+            f"{name} has no hash, and velocities differ from the derivatives of the "
             f"positions: {worst} of the highest."
         )
         print(one_line(text), file=sys.stderr)
     return ordered
 
 
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+def _read(
+    source: Path | io.BytesIO,
+) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     """Returns header and arrays; no more is unpacked than is asked for and fits."""
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError(f"It is larger than {MAX_BYTES >> 20} MB.")
-    with path.open("rb") as file, zipfile.ZipFile(file) as archive:
+    with source.open("rb") if isinstance(source, Path) else source as file:
+        if file.seek(0, io.SEEK_END) > MAX_BYTES:
+            raise InputError(f"It is larger than {MAX_BYTES >> 20} MB.")
+        return _unpacked(file)
+
+
+def _unpacked(file: IO[bytes]) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    with zipfile.ZipFile(file) as archive:
         members = {info.filename: info for info in archive.infolist()}
         if "header.npy" not in members:
             raise ValueError("no header")

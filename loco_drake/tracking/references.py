@@ -1,9 +1,10 @@
 """Plans for training a tracker, smoothed in advance."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from loco_drake.common.errors import InputError
+from loco_drake.common.errors import InputError, quoted
 from loco_drake.control.plan import Plan, plan_from_motion
 from loco_drake.control.retiming import fall_limit, path_limits, smooth_plan
 from loco_drake.generation.generate import generate_motions
@@ -11,7 +12,7 @@ from loco_drake.generation.motion_model import pretrained_motion_model
 from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import parse_label
 from loco_drake.motion.motion import Motion
-from loco_drake.motion.motion_file import load_motion
+from loco_drake.motion.motion_folder import open_motions
 
 
 def smooth_motions(robot: Robot, motions: Iterable[Motion]) -> list[Plan]:
@@ -26,16 +27,21 @@ def smooth_motions(robot: Robot, motions: Iterable[Motion]) -> list[Plan]:
 
 
 def read_motions(robot: Robot, folder: Path) -> dict[Path, Motion]:
-    """Returns the Motion files in ``folder``, in the order of their names.
+    """Returns the motions in ``folder``, packed or not, by file.
 
     Raises:
-        InputError: if there are none, or one is of another robot.
+        InputError: if there are none, one is of another robot, or two have one name.
     """
-    # Hidden files are left by a process that was killed.
-    paths = sorted(Path(folder).glob("[!.]*.npz"))
-    if not paths:
+    found = open_motions(folder, nested=False)
+    if not found:
         raise InputError(f"There are no Motion files (*.npz) in {str(folder)!r}.")
-    motions = {path: load_motion(path) for path in paths}
+    motions = {Path(found.path(i)): motion for i, motion in enumerate(found)}
+    names = Counter(path.name for path in motions)
+    name, count = names.most_common(1)[0]
+    if count > 1:  # from several folders that are packed together
+        raise InputError(
+            f"There are {count} motions called {quoted(name)} in {str(folder)!r}."
+        )
     for path, motion in motions.items():
         if motion.robot != robot.name:
             raise InputError(f"{path} is of {motion.robot}, not of {robot.name}.")

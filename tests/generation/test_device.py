@@ -8,6 +8,7 @@ import pytest
 import torch
 from torch import nn
 
+from loco_drake.generation.clips import Clip
 from loco_drake.generation.features import SIZE
 from loco_drake.generation.generator import Generator, GeneratorConfig
 from loco_drake.generation.point_masses import PointMasses
@@ -20,7 +21,6 @@ from loco_drake.generation.train_tokenizer import (
     Scales,
     tokenizer_losses,
 )
-from loco_drake.generation.training_motions import Clip
 from loco_drake.motion.gaits import LABELS
 
 META = torch.device("meta")

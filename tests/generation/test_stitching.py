@@ -3,8 +3,8 @@ import pytest
 
 from loco_drake.common.errors import InputError
 from loco_drake.generation import features as ft
+from loco_drake.generation.clips import Clip
 from loco_drake.generation.stitching import BLEND, SHORTEST_STAY, Stitcher
-from loco_drake.generation.training_motions import Clip
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
 

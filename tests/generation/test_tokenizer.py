@@ -117,7 +117,7 @@ def test_memory_is_not_longer_than_needed(tokenizer):
 
 def test_normalization_is_part_of_the_weights(tokenizer, tmp_path):
     features = torch.randn(500, SIZE) * 3 + 5
-    tokenizer.set_statistics(features)
+    tokenizer.set_statistics(features.mean(dim=0), features.std(dim=0))
     save_network(tmp_path / "t.safetensors", "tokenizer", tokenizer, half=True)
     loaded = load_tokenizer(tmp_path / "t.safetensors")
     torch.testing.assert_close(loaded.mean[0], torch.tensor(5.0), atol=0.5, rtol=0)

@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from loco_drake.common.errors import InputError
+from loco_drake.generation.clips import Clip
 from loco_drake.generation.features import SIZE
 from loco_drake.generation.generator import (
     GeneratorConfig,
@@ -30,7 +31,7 @@ from loco_drake.generation.train_tokenizer import (
     energy_error,
     train_tokenizer,
 )
-from loco_drake.generation.training_motions import Clip, load_library
+from loco_drake.generation.training_motions import load_library
 from loco_drake.motion.gaits import parse_label
 
 TINY = TokenizerConfig(width=24, depth=1, frame_width=8, codebooks=2, codebook_size=16)

@@ -4,12 +4,9 @@ import numpy as np
 import pytest
 
 from loco_drake.common.errors import InputError
+from loco_drake.generation.clips import Clip
 from loco_drake.generation.features import SIZE
-from loco_drake.generation.training_motions import (
-    Clip,
-    clip_probabilities,
-    load_library,
-)
+from loco_drake.generation.training_motions import clip_probabilities, load_library
 from loco_drake.motion.gaits import parse_label
 from loco_drake.motion.motion_file import save_motion
 
@@ -60,7 +57,7 @@ def test_motions_without_a_split_are_for_training(tmp_path, make_synthetic):
         save_motion(motion, tmp_path / f"{i}.npz")
     library = load_library(tmp_path)
     assert len({clip.recording for clip in library.train}) == 2
-    assert library.held_out == ()
+    assert not library.held_out
 
 
 def test_labels_are_drawn_by_the_square_root_of_their_time():

@@ -1,0 +1,146 @@
+"""Memory and time of packing, and of trainings, against the number of clips.
+
+Clips of 1.5 s are cut, at moments of their own, out of 10 s of generated motion that
+was steered: enough motion for memory, not for learning. Each command is a process of
+its own, whose peak of resident memory the system tells. Nothing is mapped into memory,
+so that files which the system keeps there do not count.
+
+100,000 clips take 5 GB of disk and an hour of one core. Run it from the root of the
+repository:
+
+    OMP_NUM_THREADS=1 python benchmarks/library.py --counts 1000 10000 100000
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import tyro
+
+from loco_drake.cli.output import write_json
+from loco_drake.motion.motion import FPS, Motion
+from loco_drake.motion.motion_file import motion_bytes
+from loco_drake.motion.motion_folder import open_motions
+
+GAITS = ("dog-trot", "dog-pace", "horse-walk", "mpc-bound", "solo8-crawl")
+SECONDS = 10.0  # of each motion that clips are cut out of
+FRAMES = round(1.5 * FPS) + 1  # of a clip
+
+
+def measured(*arguments: str) -> dict[str, float]:
+    """Runs ``loco-drake`` with arguments; returns its peak memory, CPU time and time.
+
+    Raises:
+        RuntimeError: if it fails.
+    """
+    code = "import sys; from loco_drake.cli.main import main; sys.exit(main())"
+    command = [sys.executable, "-c", code, *arguments]
+    begin = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise RuntimeError(f"{' '.join(arguments)} failed: {process.returncode}")
+    unit = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss, bytes
+    return {
+        "peak_mb": usage.ru_maxrss * unit / 2**20,
+        "cpu_s": usage.ru_utime + usage.ru_stime,
+        "wall_s": time.perf_counter() - begin,
+    }
+
+
+def generate(folder: Path, motions: int) -> None:
+    """Writes steered motion to cut clips out of, about as much of each gait."""
+    for gait in GAITS:
+        options = f"--gait {gait} --count {motions // len(GAITS)} --duration {SECONDS}"
+        measured("generate", *options.split(), "--steer", "--out", str(folder))
+
+
+def cut_clips(motions: Sequence[Motion], count: int) -> Iterator[bytes]:
+    """Yields Motion files, cut at different moments.
+
+    They say what they are cut out of, as those of recordings do; every tenth motion is
+    held out.
+    """
+    starts = len(motions[0]) - FRAMES
+    for number in range(count):
+        turn, source = divmod(number, len(motions))
+        start = 7 * turn % starts  # 7 divides no number of starts that is used here
+        clip = motions[source].slice(start, start + FRAMES)
+        origin = {
+            "recording": str(source),
+            "file": str(source),
+            "frames": f"{start}-{start + FRAMES}",
+            "split": "train" if source % 10 else "validation",
+        }
+        provenance = {**clip.provenance, **origin}
+        yield motion_bytes(replace(clip, provenance=provenance))
+
+
+def measure(folder: Path, sources: Path, count: int) -> dict[str, Any]:
+    """Makes ``count`` clips, packs them and trains on them; returns the figures."""
+    plain, packed = folder / "plain", folder / "packed"
+    plain.mkdir(parents=True)
+    for number, content in enumerate(cut_clips(list(open_motions(sources)), count)):
+        (plain / f"{number:06}.npz").write_bytes(content)
+    figures: dict[str, Any] = {"clips": count}
+    figures["data pack"] = measured(
+        "data", "pack", "--motions", str(plain), "--out", str(packed)
+    )
+    shutil.rmtree(plain)
+    figures["packed_mb"] = sum(p.stat().st_size for p in packed.iterdir()) / 2**20
+    runs = folder / "runs"
+    options = f"--motions {packed} --steps 40 --out {runs}/tokenizer"
+    figures["train tokenizer"] = measured("train", "tokenizer", *options.split())
+    options = (
+        f"--motions {packed} --steps 20 --out {runs}/generator --stitched 20 "
+        f"--tokenizer {runs}/tokenizer/tokenizer.safetensors"
+    )
+    figures["train generator"] = measured("train", "generator", *options.split())
+    shutil.rmtree(folder)
+    return figures
+
+
+def main(
+    counts: tuple[int, ...] = (1000, 10_000, 100_000),
+    motions: int = 250,
+    folder: Path | None = None,
+    json: Path | None = None,
+) -> None:
+    """Prints peak memory and CPU time of each command at each number of clips.
+
+    Args:
+        counts: numbers of clips.
+        motions: number of motions that they are cut out of.
+        folder: where files are made and removed; temporary if there is none.
+        json: file for the figures.
+    """
+    with TemporaryDirectory(dir=folder) as made:
+        sources = Path(made) / "sources"
+        generate(sources, motions)
+        found = []
+        for count in counts:
+            figures = measure(Path(made) / str(count), sources, count)
+            found.append(figures)
+            for command in ("data pack", "train tokenizer", "train generator"):
+                of, first = figures[command], found[0][command]
+                print(
+                    f"{count:7} clips, {command}: {of['peak_mb']:.0f} MB, "
+                    f"{of['peak_mb'] / first['peak_mb']:.2f} of that at {counts[0]}; "
+                    f"{of['cpu_s']:.0f} s of CPU",
+                    flush=True,
+                )
+            print(f"{count:7} clips: {figures['packed_mb']:.0f} MB packed", flush=True)
+    if json is not None:
+        write_json(json, {"sizes": found})
+
+
+if __name__ == "__main__":
+    tyro.cli(main)
