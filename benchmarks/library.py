@@ -10,9 +10,13 @@ memory, so that files which the system keeps there do not count.
 repository:
 
     OMP_NUM_THREADS=1 python benchmarks/library.py --counts 1000 10000 100000
+
+With `--made` only the tokenizer is trained, on features that are made instead of read,
+which takes some minutes.
 """
 
 import os
+import resource
 import shutil
 import subprocess
 import sys
@@ -23,9 +27,18 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
 import tyro
 
 from loco_drake.cli.output import write_json
+from loco_drake.generation.clips import Clip, ClipFile
+from loco_drake.generation.features import CONTACTS, HEIGHT, JOINTS, SIZE
+from loco_drake.generation.loop_settings import LoopSettings
+from loco_drake.generation.tokenizer import TokenizerConfig
+from loco_drake.generation.train_tokenizer import train_tokenizer
+from loco_drake.generation.training_motions import Library
+from loco_drake.models.robots import get_robot
+from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import FPS, Motion
 from loco_drake.motion.motion_file import motion_bytes
 from loco_drake.motion.motion_folder import open_motions
@@ -35,6 +48,12 @@ SECONDS = 10.0  # of each motion that clips are cut out of
 FRAMES = round(1.5 * FPS) + 1  # of a clip
 CAT = "examples/cat.bvh --source examples/cat.yaml --gait trot --start 275 --end 351"
 COMMANDS = ("retarget", "data pack", "train tokenizer", "train generator")
+
+
+def peak_mb(usage: resource.struct_rusage) -> float:
+    """Returns the highest resident memory of a process in MB."""
+    unit = 1 if sys.platform == "darwin" else 1024
+    return usage.ru_maxrss * unit / 2**20
 
 
 def measured(*arguments: str) -> dict[str, float]:
@@ -51,9 +70,8 @@ def measured(*arguments: str) -> dict[str, float]:
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
         raise RuntimeError(f"{' '.join(arguments)} failed: {process.returncode}")
-    unit = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss, bytes
     return {
-        "peak_mb": usage.ru_maxrss * unit / 2**20,
+        "peak_mb": peak_mb(usage),
         "cpu_s": usage.ru_utime + usage.ru_stime,
         "wall_s": time.perf_counter() - begin,
     }
@@ -114,11 +132,38 @@ def measure(folder: Path, sources: Path, count: int) -> dict[str, Any]:
     return figures
 
 
+def train_on_made(folder: Path, count: int, steps: int = 110) -> None:
+    """Trains the tokenizer on random features of ``count`` clips; prints its memory."""
+    random = np.random.default_rng(0)
+    base = np.cumsum(random.normal(size=(200, FRAMES, SIZE)) * 0.02, axis=1)
+    base[..., JOINTS] += get_robot("go2").stand_joints
+    base[..., HEIGHT] += 1
+    base[..., CONTACTS] = base[..., CONTACTS] > 0
+    begin = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
+    clips = ClipFile(folder)
+    for number in range(count):
+        features = np.roll(base[number % 200], number // 200 % FRAMES, axis=0)
+        label, name = LABELS[number % len(GAITS)], f"r{number % 200}"
+        clip = Clip("go2", label, name, features, f"{number:016x}")
+        clips.append(clip)
+        clips.append(clip)  # in the place of its mirror image
+    training = LoopSettings(folder / str(count), steps, 1e-3)
+    robots = TokenizerConfig(robots=("go2",))
+    train_tokenizer(Library(clips, ()), robots, training)
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    print(
+        f"{count:7} clips, train tokenizer: {peak_mb(usage):.0f} MB, {begin:.0f} MB of "
+        f"them before the first clip; {usage.ru_utime + usage.ru_stime:.0f} s of CPU",
+        flush=True,
+    )
+
+
 def main(
     counts: tuple[int, ...] = (1000, 10_000, 100_000),
     motions: int = 250,
     folder: Path | None = None,
     json: Path | None = None,
+    made: bool = False,
 ) -> None:
     """Prints peak memory and CPU time of each command at each number of clips.
 
@@ -127,13 +172,23 @@ def main(
         motions: number of motions that they are cut out of.
         folder: where files are made and removed; temporary if there is none.
         json: file for the figures.
+        made: whether only to train, on made features; several counts in a process each.
     """
-    with TemporaryDirectory(dir=folder) as made:
-        sources = Path(made) / "sources"
+    if made and len(counts) > 1:
+        for count in counts:
+            options = ["--made", "--counts", str(count)]
+            options += [] if folder is None else ["--folder", str(folder)]
+            subprocess.run([sys.executable, __file__, *options], check=True)
+        return
+    with TemporaryDirectory(dir=folder) as name:
+        if made:
+            train_on_made(Path(name), *counts)
+            return
+        sources = Path(name) / "sources"
         generate(sources, motions)
         found = []
         for count in counts:
-            figures = measure(Path(made) / str(count), sources, count)
+            figures = measure(Path(name) / str(count), sources, count)
             found.append(figures)
             for command in COMMANDS:
                 of, first = figures[command], found[0][command]

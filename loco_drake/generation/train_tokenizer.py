@@ -123,16 +123,17 @@ def statistics(clips: Sequence[Clip]) -> tuple[Tensor, Tensor]:
     for part in in_parts(clips):
         frames = np.concatenate([clip.features for clip in part])
         rows = torch.tensor(frames, dtype=torch.float32)
-        parts.append((rows.mean(dim=0), rows.std(dim=0), len(rows)))
-    mean, std, _ = parts[0]
-    if len(parts) > 1:
-        moments = (
-            (n, mean.double().numpy(), np.square(std.double().numpy()))
-            for mean, std, n in parts
-        )
-        _, means, variances = reduce(_together, moments)
-        mean, std = (torch.from_numpy(x).float() for x in (means, np.sqrt(variances)))
-    return mean, std
+        parts.append((len(rows), rows.mean(dim=0), rows.std(dim=0)))
+    _, mean, std = parts[0]
+    if len(parts) == 1:
+        return mean, std
+    moments = (
+        (n, mean.double().numpy(), np.square(std.double().numpy()) * (1 - 1 / n))
+        for n, mean, std in parts
+    )
+    n, means, variances = reduce(_together, moments)
+    deviations = np.sqrt(variances / (1 - 1 / n))
+    return torch.from_numpy(means).float(), torch.from_numpy(deviations).float()
 
 
 class LearningTokenizer(nn.Module):

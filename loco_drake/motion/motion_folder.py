@@ -91,6 +91,7 @@ class PackedMotions(Motions):
 
     def content(self, index: int) -> bytes:
         """Returns the bytes of a motion's file, as it was packed."""
+        index = range(len(self))[index]
         number, name = self._shards[index], self.names[index]
         try:
             content = self._archive(number).read(name)

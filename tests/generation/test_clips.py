@@ -204,7 +204,7 @@ def test_statistics_in_parts_are_those_of_the_whole(library, eager, monkeypatch)
     monkeypatch.setattr(clips_module, "HELD_FRAMES", 200)  # clips have 80 to 100
     assert sum(1 for _ in in_parts(library.train)) > 3
     for found, wanted in zip(statistics(library.train), whole, strict=True):
-        torch.testing.assert_close(found, wanted, rtol=1e-3, atol=1e-5)
+        torch.testing.assert_close(found, wanted, rtol=1e-5, atol=1e-6)
     torch.testing.assert_close(
         Scales(library.train)._scales, scales, rtol=1e-5, atol=1e-7
     )
