@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from loco_drake.common.errors import InputError
 from loco_drake.control.retiming import GROUNDED_FALL, path_limits
+from loco_drake.evaluation.recorded import load_to_score
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion import FPS, make_motion
 from loco_drake.motion.motion_file import save_motion
+from loco_drake.motion.packing import pack
 from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.scenario import (
     ExternalAction,
@@ -16,7 +19,7 @@ from loco_drake.systems.scenario import (
     Scenario,
     SmootherConfig,
 )
-from loco_drake.tracking.references import smooth_motions
+from loco_drake.tracking.references import read_motions, smooth_motions
 from tests.synthetic_motion import synthetic_motion
 
 
@@ -72,3 +75,20 @@ def test_the_smoother_of_a_diagram_takes_the_same_limit(hops, tmp_path):
         ends.append(plan.q[plan.index(0.9), 4])
     slowed, kept, limited = ends
     assert limited == slowed < 0.97 * kept
+
+
+def test_references_may_be_packed(tmp_path):
+    """Of two that were packed from several folders, one could not be told apart."""
+    robot = get_robot("go2")
+    for folder, name, speed in (("a", "x", 0.5), ("a", "y", 0.6), ("b", "x", 0.7)):
+        motion = synthetic_motion("dog-trot", 0.4, speed)
+        save_motion(motion, tmp_path / folder / f"{name}.npz")
+    pack([tmp_path / "a"], tmp_path / "one")
+    plain, packed = (read_motions(robot, tmp_path / name) for name in ("a", "one"))
+    assert [path.name for path in packed] == ["x.npz", "y.npz"]
+    for a, b in zip(plain.values(), packed.values(), strict=True):
+        np.testing.assert_array_equal(a.base_position, b.base_position)
+    assert len(load_to_score(tmp_path / "one", robot)) == 2
+    pack([tmp_path / "a", tmp_path / "b"], tmp_path / "two")
+    with pytest.raises(InputError, match=r"There are 2 motions called 'x\.npz' in"):
+        read_motions(robot, tmp_path / "two")
