@@ -3,7 +3,7 @@
 `retarget` makes that many steered variants of 1.5 s of a cat's trot. The clips that are
 packed and learned from, of 1.5 s too, are cut at different moments out of generated
 motion that was steered: enough for memory, not for learning. Each command is a process
-of its own, whose peak of resident memory the system tells. Nothing is mapped into
+of its own, whose peak of resident memory Linux tells. Nothing is mapped into
 memory, so that files which the system keeps there do not count.
 
 100,000 clips take 5 GB of disk and an hour of one core. Run it from the root of the
@@ -16,7 +16,7 @@ which takes some minutes.
 """
 
 import os
-import resource
+import re
 import shutil
 import subprocess
 import sys
@@ -24,21 +24,13 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import NamedTemporaryFile, TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import tyro
 
 from loco_drake.cli.output import write_json
-from loco_drake.generation.clips import Clip, ClipFile
-from loco_drake.generation.features import CONTACTS, HEIGHT, JOINTS, SIZE
-from loco_drake.generation.loop_settings import LoopSettings
-from loco_drake.generation.tokenizer import TokenizerConfig
-from loco_drake.generation.train_tokenizer import train_tokenizer
-from loco_drake.generation.training_motions import Library
-from loco_drake.models.robots import get_robot
-from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import FPS, Motion
 from loco_drake.motion.motion_file import motion_bytes
 from loco_drake.motion.motion_folder import open_motions
@@ -47,13 +39,17 @@ GAITS = ("dog-trot", "dog-pace", "horse-walk", "mpc-bound", "solo8-crawl")
 SECONDS = 10.0  # of each motion that clips are cut out of
 FRAMES = round(1.5 * FPS) + 1  # of a clip
 CAT = "examples/cat.bvh --source examples/cat.yaml --gait trot --start 275 --end 351"
+STATUS = Path("/proc/self/status")
 COMMANDS = ("retarget", "data pack", "train tokenizer", "train generator")
 
 
-def peak_mb(usage: resource.struct_rusage) -> float:
-    """Returns the highest resident memory of a process in MB."""
-    unit = 1 if sys.platform == "darwin" else 1024
-    return usage.ru_maxrss * unit / 2**20
+def peak_mb() -> float:
+    """Returns the highest resident memory that this process had, in MB.
+
+    Linux tells it. That of getrusage counts the parent of a process, too.
+    """
+    (line,) = re.findall(r"^VmHWM:\s*(\d+) kB$", STATUS.read_text(), re.M)
+    return int(line) / 1024
 
 
 def measured(*arguments: str) -> dict[str, float]:
@@ -62,19 +58,29 @@ def measured(*arguments: str) -> dict[str, float]:
     Raises:
         RuntimeError: if it fails.
     """
-    code = "import sys; from loco_drake.cli.main import main; sys.exit(main())"
-    command = [sys.executable, "-c", code, *arguments]
     begin = time.perf_counter()
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        raise RuntimeError(f"{' '.join(arguments)} failed: {process.returncode}")
+    with NamedTemporaryFile() as told:
+        command = [sys.executable, __file__, "--run", told.name, *arguments]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode:
+            raise RuntimeError(f"{' '.join(arguments)} failed: {process.returncode}")
+        peak = float(Path(told.name).read_text())
     return {
-        "peak_mb": peak_mb(usage),
+        "peak_mb": peak,
         "cpu_s": usage.ru_utime + usage.ru_stime,
         "wall_s": time.perf_counter() - begin,
     }
+
+
+def run(told: Path, arguments: list[str]) -> int:
+    """Runs ``loco-drake`` in this process and writes its peak memory to a file."""
+    from loco_drake.cli.main import main
+
+    status = main(arguments)
+    told.write_text(str(peak_mb()))
+    return status
 
 
 def generate(folder: Path, motions: int) -> None:
@@ -134,12 +140,21 @@ def measure(folder: Path, sources: Path, count: int) -> dict[str, Any]:
 
 def train_on_made(folder: Path, count: int, steps: int = 110) -> None:
     """Trains the tokenizer on random features of ``count`` clips; prints its memory."""
+    from loco_drake.generation.clips import Clip, ClipFile
+    from loco_drake.generation.features import CONTACTS, HEIGHT, JOINTS, SIZE
+    from loco_drake.generation.loop_settings import LoopSettings
+    from loco_drake.generation.tokenizer import TokenizerConfig
+    from loco_drake.generation.train_tokenizer import train_tokenizer
+    from loco_drake.generation.training_motions import Library
+    from loco_drake.models.robots import get_robot
+    from loco_drake.motion.gaits import LABELS
+
     random = np.random.default_rng(0)
     base = np.cumsum(random.normal(size=(200, FRAMES, SIZE)) * 0.02, axis=1)
     base[..., JOINTS] += get_robot("go2").stand_joints
     base[..., HEIGHT] += 1
     base[..., CONTACTS] = base[..., CONTACTS] > 0
-    begin = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
+    begin = peak_mb()
     clips = ClipFile(folder)
     for number in range(count):
         features = np.roll(base[number % 200], number // 200 % FRAMES, axis=0)
@@ -150,10 +165,9 @@ def train_on_made(folder: Path, count: int, steps: int = 110) -> None:
     training = LoopSettings(folder / str(count), steps, 1e-3)
     robots = TokenizerConfig(robots=("go2",))
     train_tokenizer(Library(clips, ()), robots, training)
-    usage = resource.getrusage(resource.RUSAGE_SELF)
     print(
-        f"{count:7} clips, train tokenizer: {peak_mb(usage):.0f} MB, {begin:.0f} MB of "
-        f"them before the first clip; {usage.ru_utime + usage.ru_stime:.0f} s of CPU",
+        f"{count:7} clips, train tokenizer: {peak_mb():.0f} MB, {begin:.0f} MB of "
+        f"them before the first clip; {time.process_time():.0f} s of CPU",
         flush=True,
     )
 
@@ -204,4 +218,6 @@ def main(
 
 
 if __name__ == "__main__":
+    if sys.argv[1:2] == ["--run"]:
+        sys.exit(run(Path(sys.argv[2]), sys.argv[3:]))
     tyro.cli(main)
