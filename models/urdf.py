@@ -106,7 +106,7 @@ def read_legs(path: Path, trunk: str, legs: Sequence[LegFile]) -> UrdfLegs:
     root = read_xml(path)
     elements = {str(joint.get("name")): joint for joint in root.iterfind("joint")}
     limits = np.array(
-        [_read_limits(elements[check_choice("joint", n, elements)]) for n in names]
+        [read_limits(elements[check_choice("joint", n, elements)]) for n in names]
     )
     for leg, of_leg in zip(legs, limits.reshape(4, -1, len(LIMITS)), strict=True):
         for k, key in enumerate(LIMITS):
@@ -193,7 +193,7 @@ def read_xml(path: Path) -> ET.Element:
     return root
 
 
-def _read_limits(joint: ET.Element) -> tuple[float, float, float]:
+def read_limits(joint: ET.Element) -> tuple[float, float, float]:
     """Returns lower, upper and speed limit of a revolute joint; infinite by default.
 
     Drake would stop the process for limits that contradict each other.

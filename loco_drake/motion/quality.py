@@ -8,6 +8,7 @@ import numpy as np
 
 from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import quat_rotate
+from loco_drake.models.legged import LeggedRobot
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion.motion import Motion
 
@@ -17,8 +18,8 @@ STANCE_HEIGHT = 0.010
 _LIMIT_TOLERANCE = 1e-6
 
 
-def toe_trajectories(motion: Motion, robot: Quadruped) -> Array:
-    """Returns the centres of the toe spheres p_WF in m, shape (T, 4, 3)."""
+def toe_trajectories(motion: Motion, robot: LeggedRobot) -> Array:
+    """Returns the centres of the toe spheres p_WF in m; of four legs (T, 4, 3)."""
     p_BF = robot.toe_positions(motion.joint_positions)
     p_BoF_W = quat_rotate(motion.base_quaternion[:, None], p_BF)
     return motion.base_position[:, None] + p_BoF_W
@@ -27,7 +28,7 @@ def toe_trajectories(motion: Motion, robot: Quadruped) -> Array:
 def stance_slip_speeds(p_WF: Array, foot_radius: float, fps: float) -> Array:
     """Returns the horizontal speed in m/s of each toe in each step of its stance, (N,).
 
-    A toe, with its sphere's centre at p_WF (T, 4, 3), is in stance if the lowest point
+    A toe, with its sphere's centre at p_WF (T, N, 3), is in stance if the lowest point
     of its sphere is within 10 mm of the ground, or below it, in two consecutive frames.
     The speed is that between these frames.
     """
@@ -48,14 +49,14 @@ def penetration_max(p_WF: Array, foot_radius: float) -> float:
     return float(max(0.0, foot_radius - p_WF[..., 2].min()))
 
 
-def joint_limit_violations(joints: Array, robot: Quadruped) -> int:
+def joint_limit_violations(joints: Array, robot: LeggedRobot) -> int:
     """Returns the number of ``joints`` (T, J) outside the position limits."""
     below = joints < robot.joint_lower - _LIMIT_TOLERANCE
     above = joints > robot.joint_upper + _LIMIT_TOLERANCE
     return int((below | above).sum())
 
 
-def joint_speed_ratio_max(joints: Array, robot: Quadruped, fps: float) -> float:
+def joint_speed_ratio_max(joints: Array, robot: LeggedRobot, fps: float) -> float:
     """Returns the highest ratio of joint speed to its limit; up to 1 is valid.
 
     Speeds are those between consecutive frames of ``joints`` (T, J).

@@ -1,9 +1,11 @@
 """Measures of the animal: when it stands, how high, and on which toes."""
 
+from typing import Protocol
+
 import numpy as np
 from scipy.ndimage import binary_opening
 
-from loco_drake.common.arrays import Bools
+from loco_drake.common.arrays import Array, Bools
 from loco_drake.common.errors import InputError
 from loco_drake.common.runs import intervals
 from loco_drake.motion.keypoints import KeypointClip
@@ -97,7 +99,18 @@ def stance_height(clip: KeypointClip, config: RetargetConfig) -> float:
     return float(np.percentile(middle[standing], config.stance_height_percentile))
 
 
-def detect_contacts(clip: KeypointClip, height: float, config: ContactConfig) -> Bools:
+class Standing(Protocol):
+    """What stands on toes: a body on any legs."""
+
+    @property
+    def fps(self) -> float: ...
+    @property
+    def toes(self) -> Array: ...
+    @property
+    def middle(self) -> Array: ...
+
+
+def detect_contacts(clip: Standing, height: float, config: ContactConfig) -> Bools:
     """Returns which toes (T, 4) are on the ground, by height and speed.
 
     A toe lands when it is low *and* slow, and leaves when it is high *or* fast; the

@@ -103,6 +103,12 @@ def penalty(cutoff: float, fps: float) -> float:
     return float((2 * np.sin(np.pi * cutoff / fps)) ** (-2 * _ORDER))
 
 
+def smoothness_matrix(frames: int, cutoff: float, fps: float) -> csc_matrix:
+    """Returns S = 1 + w D' D, (frames, frames): half the slope of what is minimized."""
+    D = difference_matrix(frames)
+    return penalty(cutoff, fps) * (D.T @ D) + eye_array(frames)
+
+
 def smooth(values: Array, cutoff: float, fps: float) -> Array:
     """Returns ``values`` (T, ...) after a zero-phase low-pass along the first axis.
 
@@ -119,18 +125,16 @@ def smooth(values: Array, cutoff: float, fps: float) -> Array:
 def plant_feet(
     p_WF: Array, contacts: Bools, foot_radius: float, cutoff: float, fps: float
 ) -> Array:
-    """Returns toes (T, 4, 3) that stand still in contact and swing above the ground.
+    """Returns toes (T, N, 3) that stand still in contact and swing above the ground.
 
-    ``p_WF`` are the formula's targets in m, ``contacts`` (T, 4) say which toes are on
+    ``p_WF`` are the formula's targets in m, ``contacts`` (T, N) say which toes are on
     the ground, and ``cutoff`` is that of the smoothing in Hz.
     """
-    weight = penalty(cutoff, fps)
-    D = difference_matrix(len(p_WF))
-    smoothness = weight * (D.T @ D) + eye_array(len(p_WF))
+    smoothness = smoothness_matrix(len(p_WF), cutoff, fps)
     planted = np.empty_like(p_WF)
-    for leg in range(4):
+    for leg in range(contacts.shape[1]):
         target, contact = p_WF[:, leg], contacts[:, leg]
-        planted[:, leg, :2] = _fit_ground_plane(target[:, :2], contact, smoothness)
+        planted[:, leg, :2] = fit_constant(target[:, :2], contact, smoothness)
         floor = foot_radius + swing_clearance(contact, fps)
         planted[:, leg, 2] = _fit_height(target[:, 2], contact, floor, smoothness)
     return planted
@@ -153,14 +157,14 @@ def swing_clearance(contact: Bools, fps: float) -> Array:
     return clearance
 
 
-def _fit_ground_plane(target: Array, contact: Bools, smoothness: csc_matrix) -> Array:
-    """Returns x, y (T, 2) nearest to ``target`` that are constant in each contact."""
+def fit_constant(target: Array, contact: Bools, smoothness: csc_matrix) -> Array:
+    """Returns values (T, n) near to ``target`` that are constant in each contact."""
     frames = len(target)
     # A value differs from that of the frame before, but within a contact.
     columns = np.r_[0, np.cumsum(~(contact[1:] & contact[:-1]))]
     M = csr_matrix((np.ones(frames), (np.arange(frames), columns)))
     values = spsolve(csc_matrix(M.T @ smoothness @ M), M.T @ target)
-    fitted: Array = M @ values.reshape(-1, 2)
+    fitted: Array = M @ values.reshape(-1, target.shape[1])
     return fitted
 
 
@@ -174,18 +178,26 @@ def _fit_height(
     held = contact.copy()
     height = floor.copy()
     for _ in range(_MAX_ROUNDS):
-        free = ~held
-        if not free.any():
+        if held.all():
             break
-        coupling = smoothness.tocsr()[free]
-        right = target[free] - coupling[:, held] @ floor[held]
-        height = floor.copy()
-        height[free] = spsolve(csc_matrix(coupling[:, free]), right)
+        height = fit_held(target, held, floor, smoothness)
         sunk = height < floor - 1e-9
         if not sunk.any():
             break
         held |= sunk
     return np.maximum(height, floor)
+
+
+def fit_held(
+    target: Array, held: Bools, values: Array, smoothness: csc_matrix
+) -> Array:
+    """Returns values (T,) near to ``target``, those that are held at ``values``."""
+    free = ~held
+    coupling = smoothness.tocsr()[free]
+    right = target[free] - coupling[:, held] @ values[held]
+    fitted = values.copy()
+    fitted[free] = spsolve(csc_matrix(coupling[:, free]), right)
+    return fitted
 
 
 def raise_trunk(targets: Targets, robot: Quadruped, fps: float) -> Targets:
@@ -202,7 +214,7 @@ def raise_trunk(targets: Targets, robot: Quadruped, fps: float) -> Targets:
         missing = np.maximum(lowest_hip - hips, KNEE_CLEARANCE - knees)
         if missing.max() < _CLOSE_ENOUGH:
             break
-        lift = _gentle_envelope(np.maximum(missing, 0.0), ramp)
+        lift = gentle_envelope(np.maximum(missing, 0.0), ramp)
         up = np.array([0.0, 0.0, 1.0])
         targets = replace(targets, p_WB=targets.p_WB + lift[:, None] * up)
     return targets
@@ -217,7 +229,7 @@ def _hip_and_knee_heights(targets: Targets, robot: Quadruped) -> tuple[Array, Ar
     return hips, knees
 
 
-def _gentle_envelope(values: Array, ramp: int) -> Array:
+def gentle_envelope(values: Array, ramp: int) -> Array:
     """Returns a smooth curve that is nowhere below ``values`` (T,).
 
     The moving averages are no wider than the preceding moving maximum, so each averaged

@@ -224,10 +224,21 @@ def scale_to_robot(
     p_WA = np.stack((front, front, rear, rear), axis=1) + spread[:, None] * s[:, None]
     p_WV = p_WB[:, None] + quat_rotate(base.q_WB[:, None], robot.p_BV)
 
-    p_WF = p_WV + alpha * (clip.toes - p_WA)
+    p_WF = along_tree(p_WV, p_WA, clip.toes, alpha)
     lift = config.swing_height * alpha * np.maximum(clip.toes[..., 2], 0.0)
     p_WF[..., 2] = robot.foot_radius + lift
     return replace(base, p_WF=p_WF)
+
+
+def along_tree(
+    p_WP: Array, p_WP_source: Array, p_WK_source: Array, scale: Array | float
+) -> Array:
+    """Returns where keypoints are whose parents are at ``p_WP``, (..., 3) in m.
+
+    The vector from the source's parent to its keypoint keeps its direction. This is the
+    paper's formula for one edge of a kinematic tree.
+    """
+    return p_WP + scale * (p_WK_source - p_WP_source)
 
 
 @dataclass(frozen=True)
