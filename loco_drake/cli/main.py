@@ -22,6 +22,7 @@ _COMMANDS = {
     "play": "show Motion files in the browser or in a video",
     "generate": "generate motion and write Motion files",
     "retarget": "retarget recordings to a robot",
+    "humanoid": "retarget human clips to a humanoid",
     "record": "record what a robot does with motion, to learn from",
     "data list": "list the sources of motion and their licences",
     "data fetch": "download and check the recordings",

@@ -24,7 +24,7 @@ from loco_drake.common.errors import InputError, one_line
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
 
-    from loco_drake.models.quadruped import Quadruped
+    from loco_drake.models.legged import LeggedRobot
     from loco_drake.motion.keypoints import KeypointClip
     from loco_drake.motion.motion import Motion
     from loco_drake.viewing.stage import Stage
@@ -48,7 +48,7 @@ class Play:
     # Motion files.
     files: Annotated[tuple[Path, ...], tyro.conf.Positional, option(metavar="FILE ...")]
     # Robot: the YAML file of one that motion is of, such as examples/solo8.yaml; may be
-    # repeated. go2 and a1 are known.
+    # repeated. go2, a1 and g1 are known.
     robot: Annotated[
         tuple[str, ...], tyro.conf.UseAppendAction, option(metavar="ROBOT|FILE")
     ] = ()
@@ -131,22 +131,26 @@ class Play:
             rows.append(row)
         return takes, rows
 
-    def _robots(self) -> "dict[str, Quadruped]":
-        from loco_drake.models.robots import ROBOTS, load_robot
+    def _robots(self) -> "dict[str, LeggedRobot]":
+        from loco_drake.models.robots import ROBOTS, load_figure
 
-        robots = [load_robot(definition) for definition in (*ROBOTS, *self.robot)]
+        robots = [load_figure(definition) for definition in (*ROBOTS, *self.robot)]
         return {robot.name: robot for robot in robots}
 
 
 def _robot_of(
-    motion: "Motion", path: Path, robots: "dict[str, Quadruped]"
-) -> "Quadruped":
+    motion: "Motion", path: Path, robots: "dict[str, LeggedRobot]"
+) -> "LeggedRobot":
     """Returns the robot of a motion.
 
     Raises:
         InputError: if it is none of ``robots``, or has other joints.
     """
+    from loco_drake.models.biped_file import BIPEDS, read_biped
+
     robot = robots.get(motion.robot)
+    if robot is None and motion.robot in BIPEDS:
+        robot = read_biped(motion.robot)
     if robot is None:
         raise InputError(
             f"{path} is a motion of {motion.robot}, not of {', '.join(robots)}: name "

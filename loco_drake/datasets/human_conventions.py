@@ -2,12 +2,11 @@
 
 As of four-legged sources (:mod:`.conventions`), what the file says is not trusted: a
 trunk is above its feet, toes are ahead of heels, left of right is where that says,
-knees bend backward only, and the foot that is lowest stands still, on the ground.
+knees bend backward only, and one foot stands still, on the ground.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,47 +14,50 @@ from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import quat_conjugate
 from loco_drake.datasets.conventions import UPRIGHT, with_z_up
+from loco_drake.datasets.human_file import Capture
 from loco_drake.motion.biped_clip import BipedClip
 
-if TYPE_CHECKING:
-    from loco_drake.datasets.human import Capture
+_Parts = tuple[Array, Array, Array]  # spine, legs and arms
 
 _XYZW = [3, 0, 1, 2]
-_UP = 1  # the axis that the format says is up
-# Another reading is better if the lowest foot moves at less than this of its speed, and
+UP = 1  # the axis that the format says is up
+# Another reading is better if the slower foot moves at less than this of its speed, and
 # by more than rounding, m/s.
 _CLEARLY, _SLOW = 0.5, 0.05
-# In the files known here, the lowest sole's height is within .02 of the legs' length in
-# a tenth of the frames; a unit that is off by a tenth would put it off by as much.
-_GROUND, _PERCENTILE = 0.06, 10.0
+# In the files known here of people on their feet, the lowest end of the soles is within
+# .06 of the legs' length in a tenth of the frames; a unit that is off by a tenth would
+# put it off by more.
+_GROUND, _PERCENTILE = 0.08, 10.0
 _SIDES = 0.1  # least cosine between where left is, and where it should be
 _JUMP = 1.5  # m that a point may move from a straight line within a frame
 
 
-def check_reading(
-    capture: "Capture",
-    points: Mapping[str, Array],
-    read: "Callable[[Capture], Mapping[str, Array]]",
-) -> None:
-    """Raises InputError if feet stand better with rotations read in another way.
-
-    Args:
-        capture: the file's content.
-        points: the body's points as the format says, by name, (T, 3) each.
-        read: returns the points of another capture.
-    """
+def other_readings(capture: Capture) -> dict[str, Capture]:
+    """Returns a capture with its quaternions read in other ways, by what these are."""
     q = capture.rotations
     others = {
         "x, y, z, w": {name: value[:, _XYZW] for name, value in q.items()},
         "inverse": {name: quat_conjugate(value) for name, value in q.items()},
     }
-    slip = _sole_speed(points, capture.time)
-    for how, rotations in others.items():
-        other = _sole_speed(read(replace(capture, rotations=rotations)), capture.time)
+    return {how: replace(capture, rotations=q) for how, q in others.items()}
+
+
+def check_reading(
+    capture: Capture, read: Callable[[Capture], Mapping[str, Array]]
+) -> None:
+    """Raises InputError if feet stand better with rotations read in another way.
+
+    Args:
+        capture: the file's content.
+        read: returns the points of a body by name, (T, 3) each.
+    """
+    slip = _sole_speed(read(capture), capture.time)
+    for how, reading in other_readings(capture).items():
+        other = _sole_speed(read(reading), capture.time)
         if other < _CLEARLY * slip - _SLOW:
             raise InputError(
-                f"its lowest foot moves at {slip:.2g} m/s, but at {other:.2g} m/s with "
-                f"quaternions that are {how}."
+                f"its slower foot moves at {slip:.2g} m/s, but at {other:.2g} m/s if "
+                f"its quaternions are {how}."
             )
 
 
@@ -66,11 +68,14 @@ def settle(clip: BipedClip) -> BipedClip:
         InputError: if that cannot be told, or the body would not be one.
     """
     notes = dict(clip.provenance)
-    parts = clip.spine, clip.legs, clip.arms
     axis, upward = _up_axis(clip)
-    if (axis, upward) != (_UP, True):
+    if (axis, upward) != (UP, True):
         notes["up"] = "turned upright, since another axis than the format's points up"
-    parts = tuple(with_z_up(part, axis, upward) for part in parts)
+    parts = (
+        with_z_up(clip.spine, axis, upward),
+        with_z_up(clip.legs, axis, upward),
+        with_z_up(clip.arms, axis, upward),
+    )
     parts = _name_sides(parts, notes)
     parts = _put_on_ground(parts, notes, abs(_upward(clip)[axis]) >= UPRIGHT)
     spine, legs, arms = parts
@@ -94,8 +99,8 @@ def _up_axis(clip: BipedClip) -> tuple[int, bool]:
     upright = abs(cosines[axis]) >= UPRIGHT
     if upright and _is_ground(clip, axis, cosines[axis] > 0):
         return axis, bool(cosines[axis] > 0)
-    if _is_ground(clip, _UP, True):
-        return _UP, True
+    if _is_ground(clip, UP, True):
+        return UP, True
     raise InputError(
         "its feet are not on the ground, at 0 along the axis that points up: it does "
         "not stand, or its skeleton is of another size."
@@ -123,9 +128,7 @@ def _ground(legs: Array) -> float:
     return float(np.percentile(lowest, _PERCENTILE))
 
 
-def _name_sides(
-    parts: tuple[Array, ...], notes: dict[str, str]
-) -> tuple[Array, ...]:
+def _name_sides(parts: _Parts, notes: dict[str, str]) -> _Parts:
     """Returns spine, legs and arms with left and right exchanged where they are."""
     spine, legs, arms = parts
     up = spine[:, 2] - spine[:, 0]
@@ -142,9 +145,7 @@ def _name_sides(
     return spine, legs[:, ::-1], arms[:, ::-1]
 
 
-def _put_on_ground(
-    parts: tuple[Array, ...], notes: dict[str, str], upright: bool
-) -> tuple[Array, ...]:
+def _put_on_ground(parts: _Parts, notes: dict[str, str], upright: bool) -> _Parts:
     """Returns spine, legs and arms with the ground at z = 0.
 
     Only of a body that is ``upright`` do the feet tell exactly where that is.
@@ -153,7 +154,9 @@ def _put_on_ground(
         return parts
     ground = _ground(parts[1])
     notes["ground"] = f"moved from z = {ground:.3f} m to 0"
-    return tuple(part - np.array([0.0, 0.0, ground]) for part in parts)
+    origin = np.array([0.0, 0.0, ground])
+    spine, legs, arms = parts
+    return spine - origin, legs - origin, arms - origin
 
 
 def _check_body(clip: BipedClip) -> None:
@@ -175,9 +178,8 @@ def _leg_length(legs: Array) -> float:
 
 
 def _sole_speed(points: Mapping[str, Array], time: Array) -> float:
-    """Returns the median speed of the lowest end of the feet, m/s."""
+    """Returns the median speed of that end of the feet that is slowest, m/s."""
     ends = [f"{side}_{end}" for side in ("left", "right") for end in ("heel", "toe")]
     soles = np.stack([points[name] for name in ends], axis=1)
     speeds = np.linalg.norm(np.diff(soles, axis=0), axis=-1) / np.diff(time)[:, None]
-    lowest = soles[1:, :, _UP].argmin(axis=1)
-    return float(np.median(speeds[np.arange(len(speeds)), lowest]))
+    return float(np.median(speeds.min(axis=1)))

@@ -81,17 +81,13 @@ class BipedClip:
         return np.asarray(ahead / np.maximum(length, 1e-9), dtype=np.float64)
 
     def keypoints(self) -> KeypointClip:
-        """Returns the six points that it has in common with bodies on four legs.
-
-        Toes and heels are those of a body whose pelvis is the hip, and whose withers
-        lie a metre ahead of it: so the trunk heads where the pelvis does.
-        """
+        """Returns it as six points, to be shown: the withers are the neck."""
         return KeypointClip(
             source=self.source,
             gait=self.gait,
             fps=self.fps,
-            withers=self.middle + self.forward / 2,
-            hip=self.middle - self.forward / 2,
+            withers=self.spine[:, 2],
+            hip=self.middle,
             toes=self.toes,
             provenance=self.provenance,
         )

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydrake.common.yaml import yaml_load
 
-from loco_drake.models.quadruped import Quadruped
+from loco_drake.models.legged import LeggedRobot
 
 _FILE = Path(__file__).with_suffix(".yaml")
 
@@ -34,15 +34,15 @@ BOUNDS = {
 }
 
 
-def outside_bounds(figures: Mapping[str, Any], robot: Quadruped) -> tuple[str, ...]:
+def outside_bounds(figures: Mapping[str, Any], robot: LeggedRobot) -> tuple[str, ...]:
     """Returns a sentence for each figure of the robot's motion outside its bound.
 
-    ``figures`` has all keys of :data:`BOUNDS`; None is not judged.
+    Those of :data:`BOUNDS` that are missing in ``figures``, or None, are not judged.
     """
     planar = len(robot.joint_names) < 12
     found = []
     for key, bound in BOUNDS.items():
-        value = figures[key]
+        value = figures.get(key)
         size = robot.stand_height if bound.stances else 1.0
         high = bound.planar_high if planar and bound.planar_high else bound.high
         if value is None or bound.low * size <= value <= high * size:
@@ -56,7 +56,7 @@ def outside_bounds(figures: Mapping[str, Any], robot: Quadruped) -> tuple[str, .
             limits = f"at least {least}"
         elif bound.low == 0:
             limits = f"at most {most}"
-        if key == "on_feet_share":
+        if key == "on_feet_share" and "on_feet_frames" in figures:
             shown = f"{shown} ({figures['on_feet_frames']})"
         found.append(f"{bound.name} {shown}, not {limits}")
     return tuple(found)

@@ -103,11 +103,16 @@ class Standing(Protocol):
     """What stands on toes: a body on any legs."""
 
     @property
-    def fps(self) -> float: ...
+    def fps(self) -> float:
+        """Frames per second."""
+
     @property
-    def toes(self) -> Array: ...
+    def toes(self) -> Array:
+        """Points that touch the ground in m, shape (T, N, 3)."""
+
     @property
-    def middle(self) -> Array: ...
+    def middle(self) -> Array:
+        """Of the trunk in m, shape (T, 3)."""
 
 
 def detect_contacts(clip: Standing, height: float, config: ContactConfig) -> Bools:

@@ -1,4 +1,4 @@
-"""Joint angles for positions of toes, or of other points, by Drake's InverseKinematics."""
+"""Joint angles for positions of toes or other points, by Drake's InverseKinematics."""
 
 from collections.abc import Callable
 from typing import NamedTuple

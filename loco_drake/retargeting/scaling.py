@@ -30,10 +30,11 @@ contacts are found before the clock is changed, and cut-off frequencies change w
 The clearance of a swing and the limits of the joints are the robot's.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite, sqrt
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -50,8 +51,12 @@ from loco_drake.common.typed import FieldError, convert
 from loco_drake.common.typed_yaml import read_yaml
 from loco_drake.datasets.registry import get_dataset
 from loco_drake.models.quadruped import Quadruped
+from loco_drake.motion.biped_clip import BipedClip
 from loco_drake.motion.keypoints import KeypointClip
 
+Clip = TypeVar("Clip", KeypointClip, BipedClip)
+
+HUMAN = "human"  # the source of clips of bodies on two legs
 _SOURCES = Path(__file__).parent / "sources"
 
 
@@ -115,7 +120,10 @@ def load_config(source: str) -> RetargetConfig:
     Raises:
         InputError: naming the sources that there are.
     """
-    dataset, shipped = get_dataset(source), _SOURCES / f"{source}.yaml"
+    shipped = _SOURCES / f"{source}.yaml"
+    if source == HUMAN:
+        return read_config(shipped)
+    dataset = get_dataset(source)
     own = dataset.config
     if isinstance(own, Mapping):
         where = dataset.definition or f"the configuration of {source}"
@@ -189,16 +197,27 @@ def resample(clip: KeypointClip, fps: float) -> KeypointClip:
     Raises:
         InputError: if it has fewer than 4 frames.
     """
-    if len(clip) < 4:
-        raise InputError(f"A clip needs at least 4 frames, not {len(clip)}.")
-    duration = (len(clip) - 1) / clip.fps
-    old = np.arange(len(clip)) / clip.fps
-    # A tolerance, so that a duration of whole steps keeps its last frame.
-    new = np.arange(int(duration * fps + 1e-6) + 1) / fps
-    withers, hip, toes = (
-        CubicSpline(old, points)(new) for points in (clip.withers, clip.hip, clip.toes)
-    )
+    points = (clip.withers, clip.hip, clip.toes)
+    withers, hip, toes = resample_points(points, clip.fps, fps)
     return replace(clip, fps=fps, withers=withers, hip=hip, toes=toes)
+
+
+def resample_points(
+    points: Sequence[Array], fps: float, new_fps: float
+) -> Iterator[Array]:
+    """Yields arrays (T, ...) at another rate, interpolated by cubic splines.
+
+    Raises:
+        InputError: if they have fewer than 4 frames.
+    """
+    frames = len(points[0])
+    if frames < 4:
+        raise InputError(f"A clip needs at least 4 frames, not {frames}.")
+    duration = (frames - 1) / fps
+    old = np.arange(frames) / fps
+    # A tolerance, so that a duration of whole steps keeps its last frame.
+    new = np.arange(int(duration * new_fps + 1e-6) + 1) / new_fps
+    return (CubicSpline(old, values)(new) for values in points)
 
 
 def scale_to_robot(
@@ -272,7 +291,7 @@ class Variant:
 AS_RECORDED = Variant()
 
 
-def in_time(clip: KeypointClip, time_scale: float) -> KeypointClip:
+def in_time(clip: Clip, time_scale: float) -> Clip:
     """Returns the clip on a clock that makes it ``time_scale`` times as long."""
     return replace(
         clip,

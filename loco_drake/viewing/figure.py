@@ -1,8 +1,8 @@
 """A robot that is shown: its meshes, or sticks if it is known by a robot file alone."""
 
 import numpy as np
-from pydrake.geometry import Box, Capsule, Rgba, Sphere
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.geometry import Box, Capsule, Sphere
+from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
@@ -10,25 +10,24 @@ from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
 from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import quat_multiply, quat_rotate
 from loco_drake.control.state import JOINTS, ORIENTATION, POSITION
+from loco_drake.models.biped import Biped
 from loco_drake.models.chains import ChainRobot
+from loco_drake.models.legged import LeggedRobot
 from loco_drake.models.legs import LEGS
-from loco_drake.models.quadruped import Quadruped
 from loco_drake.models.robot import Robot
+from loco_drake.viewing.humanoid_figure import AddBody
+from loco_drake.viewing.sticks import FOOT, LEFT, RIGHT, TRUNK, along
 
 # m; where what is not shown is, under the floor.
 AWAY = np.array([0.0, 0.0, -50.0])
 
-_TRUNK = Rgba(0.3, 0.32, 0.36)
-_LEFT = Rgba(0.85, 0.6, 0.25)
-_RIGHT = Rgba(0.4, 0.55, 0.75)
-_FOOT = Rgba(0.1, 0.1, 0.1)
 # Over the height of the stance.
 _TRUNK_HEIGHT = 0.2
 _LINK_RADIUS = 0.04
 
 
 def AddFigure(
-    plant: MultibodyPlant, robot: Quadruped, prefix: str
+    plant: MultibodyPlant, robot: LeggedRobot, prefix: str
 ) -> ModelInstanceIndex:
     """Adds a robot that can be seen to a plant that is not finalized.
 
@@ -37,8 +36,11 @@ def AddFigure(
     parser = Parser(plant, prefix)
     if isinstance(robot, Robot):
         return robot.AddModel(parser, visual=True)
-    assert isinstance(robot, ChainRobot)
     instance = robot.AddModel(parser)
+    if isinstance(robot, Biped):
+        AddBody(plant, robot, instance)
+        return instance
+    assert isinstance(robot, ChainRobot)
     _AddSticks(plant, robot, instance)
     return instance
 
@@ -47,7 +49,7 @@ class Figure:
     """Writes where a robot is into the positions of a finalized plant."""
 
     def __init__(
-        self, plant: MultibodyPlant, robot: Quadruped, instance: ModelInstanceIndex
+        self, plant: MultibodyPlant, robot: LeggedRobot, instance: ModelInstanceIndex
     ) -> None:
         trunk = plant.GetFrameByName(robot.trunk_frame, instance)
         floating = plant.GetFloatingBaseBodies()
@@ -108,29 +110,21 @@ def _AddSticks(
     # Hips in one plane, as of a planar robot, have a trunk between them all the same.
     box = Box(*np.maximum(size, size[2]))
     X_LG = pose(trunk) @ RigidTransform((low + high) / 2)
-    plant.RegisterVisualGeometry(trunk, X_LG, box, "trunk", _TRUNK.rgba)
+    plant.RegisterVisualGeometry(trunk, X_LG, box, "trunk", TRUNK.rgba)
     radius = _LINK_RADIUS * robot.stand_height
     count = len(robot.joint_names) // len(LEGS)
     for leg, name in enumerate(LEGS):
         ends = [*robot.origins[leg], robot.toes[leg]]
-        color = _LEFT if name[1] == "L" else _RIGHT
+        color = LEFT if name[1] == "L" else RIGHT
         for k in range(count):
             joint = plant.GetJointByName(robot.joint_names[leg * count + k], instance)
             link = joint.child_body()
             X_LB = pose(link)
             stick = f"{name}_stick{k}"
             length = float(np.linalg.norm(ends[k + 1] - ends[k]))
-            X_LG = X_LB @ _along(ends[k], ends[k + 1])
+            X_LG = X_LB @ along(ends[k], ends[k + 1])
             shape = Capsule(radius, length) if length > radius else Sphere(radius)
             plant.RegisterVisualGeometry(link, X_LG, shape, stick, color.rgba)
         toe = Sphere(robot.foot_radius)
         X_LG = X_LB @ RigidTransform(robot.toes[leg])
-        plant.RegisterVisualGeometry(link, X_LG, toe, f"{name}_toe", _FOOT.rgba)
-
-
-def _along(start: Array, end: Array) -> RigidTransform:
-    """Returns the frame midway between two points, z along the line between them."""
-    way = end - start
-    if way @ way == 0:
-        return RigidTransform(start)
-    return RigidTransform(RotationMatrix.MakeFromOneVector(way, 2), (start + end) / 2)
+        plant.RegisterVisualGeometry(link, X_LG, toe, f"{name}_toe", FOOT.rgba)

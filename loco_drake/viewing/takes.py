@@ -14,7 +14,7 @@ from loco_drake.common.rotations import (
     yaw_quat,
 )
 from loco_drake.control.state import ORIENTATION, POSITION
-from loco_drake.models.quadruped import Quadruped
+from loco_drake.models.legged import LeggedRobot
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.motion.momentum import positions
 from loco_drake.motion.motion import Motion
@@ -36,7 +36,7 @@ class Take:
     """
 
     title: str  # what the page calls it, beside its gait
-    robot: Quadruped
+    robot: LeggedRobot
     fps: float  # frames/s
     q: Array  # [q_WB as w x y z, p_WB, joints], m and rad, shape (T, 7 + J)
     points: Array | None = None  # p_WK, m, shape (T, 6, 3)
@@ -144,7 +144,7 @@ def caption_of(scenes: Sequence[Scene], number: int, time: float) -> Caption:
 
 
 def take_of_motion(
-    title: str, motion: Motion, robot: Quadruped, clip: KeypointClip | None = None
+    title: str, motion: Motion, robot: LeggedRobot, clip: KeypointClip | None = None
 ) -> Take:
     """Returns a take that begins at the origin and heads along +x.
 
