@@ -10,6 +10,7 @@ headless), `retargeting` the recordings, too:
     python docs/draw.py steering
     python docs/draw.py gait-choice docs/images/gait_choice.png
     python docs/draw.py robustness docs/images/robustness.png
+    python docs/draw.py humanoid docs/images/humanoid.png
 
 ``loco-drake evaluate ... --figures`` draws the others, among them Figure 1 of the
 paper, models/pretrained/results/retargeted-dog-pace.webp. The README's moving picture:
@@ -32,11 +33,13 @@ from pydrake.systems.framework import DiagramBuilder
 
 from loco_drake.cli.output import write_figure
 from loco_drake.common.files import atomic_path, read_json
+from loco_drake.datasets import human
 from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments, select_labels
 from loco_drake.evaluation.dataset_picture import library_figure
 from loco_drake.evaluation.gait_change import change_figure
 from loco_drake.evaluation.gait_choice_picture import choice_figure
+from loco_drake.evaluation.humanoid import person_track
 from loco_drake.evaluation.library import read_library
 from loco_drake.evaluation.report.results import load_results, results_dir
 from loco_drake.evaluation.robustness_pictures import curves_figure
@@ -50,13 +53,17 @@ from loco_drake.evaluation.tracking_pictures import (
 )
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
+from loco_drake.models.biped_file import read_biped
 from loco_drake.models.ground import AddGround
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import ROBOTS, AddRobotModel, get_robot
 from loco_drake.models.scenery import dress
 from loco_drake.models.shipped import results_path
+from loco_drake.motion.gait_timing import gait_timing
 from loco_drake.motion.gaits import parse_schedule
+from loco_drake.motion.momentum import positions
 from loco_drake.motion.motion import FPS
+from loco_drake.retargeting.biped import retarget_biped
 from loco_drake.retargeting.retarget import retarget_clip
 from loco_drake.retargeting.scaling import resample
 from loco_drake.systems.gait_selector import measured_gaits
@@ -67,6 +74,7 @@ from loco_drake.systems.scenario import (
     SteeringConfig,
     TrainedPolicy,
 )
+from loco_drake.viewing.poses import row_of, rows_figure
 
 Png = tyro.conf.Positional[Path]
 
@@ -260,6 +268,26 @@ def robustness(png: Png) -> None:
     write_figure(curves_figure(found), png, dpi=80)
 
 
+def humanoid(
+    png: Png, clips: tuple[str, ...] = ("walk", "run"), data: Path | None = None
+) -> None:
+    """A person's clips on the G1, from ``data fetch --source human``."""
+    g1 = read_biped("g1")
+    rows = []
+    for name in clips:
+        path = data_dir(data) / human.FOLDER / f"{human.PREFIX}{name}.txt"
+        clip = human.read_human(path, cycles=4)
+        motion, report = retarget_biped(clip, g1)
+        points = resample(clip.keypoints(), FPS)
+        ends = points.withers[:, None], points.hip[:, None]
+        keypoints = report.scale * np.concatenate((points.toes, *ends), axis=1)
+        timing = gait_timing(person_track(clip, g1.hip_height / report.scale))
+        stride = timing.stride_period if timing else 1.0
+        rows.append(row_of(g1, positions(motion), keypoints, stride))
+    kinds = ("toes", "heels", "neck and pelvis")
+    write_figure(rows_figure(rows, clips, kinds), png, dpi=100)
+
+
 def gait_choice(png: Png) -> None:
     """The gait that a command chooses, by what ``evaluate steering`` measured."""
     gaits = {name: measured_gaits(get_robot(name)) for name in ROBOTS}
@@ -290,5 +318,6 @@ if __name__ == "__main__":
         "steering": steering,
         "gait-choice": gait_choice,
         "robustness": robustness,
+        "humanoid": humanoid,
     }
     tyro.extras.subcommand_cli_from_dict(pictures)

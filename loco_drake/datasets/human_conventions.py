@@ -34,12 +34,18 @@ _JUMP = 1.5  # m that a point may move from a straight line within a frame
 
 def other_readings(capture: Capture) -> dict[str, Capture]:
     """Returns a capture with its quaternions read in other ways, by what these are."""
-    q = capture.rotations
+    # Knees and elbows have angles.
+    q = {
+        k: v for k, v in capture.rotations.items() if not k.endswith(("knee", "elbow"))
+    }
     others = {
         "x, y, z, w": {name: value[:, _XYZW] for name, value in q.items()},
         "inverse": {name: quat_conjugate(value) for name, value in q.items()},
     }
-    return {how: replace(capture, rotations=q) for how, q in others.items()}
+    return {
+        how: replace(capture, rotations={**capture.rotations, **other})
+        for how, other in others.items()
+    }
 
 
 def check_reading(

@@ -1,10 +1,13 @@
 """Retargeting of human clips to motions of a humanoid."""
 
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from math import inf
 
 import numpy as np
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.tree import ModelInstanceIndex
 
 from loco_drake.common.arrays import Array, Bools
 from loco_drake.common.rotations import quat_conjugate, quat_rotate
@@ -78,12 +81,12 @@ class BipedSolver:
         self.robot = robot
         count = robot.leg_joints
         feet = [(f, p) for f in robot.foot_frames for p in foot_marks(robot)]
-        legs = _linkage(robot, slice(count), tuple(feet))
-        upper = _linkage(robot, slice(count, None), upper_marks(robot))
-        self.legs = PointSolver(legs._replace(add_model=robot.AddLegs), fps)
-        self.upper = PointSolver(
-            upper._replace(add_model=robot.AddUpperBody), fps, exact=False
+        legs = _linkage(robot, robot.AddLegs, slice(count), tuple(feet))
+        upper = _linkage(
+            robot, robot.AddUpperBody, slice(count, None), upper_marks(robot)
         )
+        self.legs = PointSolver(legs, fps)
+        self.upper = PointSolver(upper, fps, exact=False)
 
     def solve_legs(self, targets: BipedTargets) -> Solution:
         """Returns the legs' joints in rad, as they are ordered."""
@@ -229,10 +232,13 @@ def in_trunk(targets: BipedTargets, points: Array) -> Array:
 
 
 def _linkage(
-    robot: Biped, joints: slice, points: tuple[tuple[str, Array], ...]
+    robot: Biped,
+    add_model: Callable[[Parser], ModelInstanceIndex],
+    joints: slice,
+    points: tuple[tuple[str, Array], ...],
 ) -> Linkage:
     return Linkage(
-        add_model=robot.AddModel,
+        add_model=add_model,
         trunk_frame=robot.trunk_frame,
         joint_names=robot.joint_names[joints],
         lower=robot.joint_lower[joints],

@@ -16,6 +16,7 @@ from matplotlib.patches import Circle
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.datasets.segments import Segment
+from loco_drake.models.legged import LeggedRobot
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion.gait_timing import clip_track, gait_timing
 from loco_drake.motion.momentum import positions
@@ -59,7 +60,22 @@ def poses_figure(
         InputError: if the stretch cannot be retargeted.
         OSError: if this machine cannot render.
     """
-    rows = [_poses(segment, robot, variant) for robot in robots]
+    return rows_figure([_poses(segment, robot, variant) for robot in robots], names)
+
+
+def rows_figure(
+    rows: Sequence[Sequence[Take]], names: Sequence[str], kinds: Sequence[str] = _KINDS
+) -> Figure:
+    """Returns rows of poses, such as :func:`row_of` makes.
+
+    Args:
+        rows: the rows, the first one on top.
+        names: what they are called.
+        kinds: what the blue, the red and the green points are.
+
+    Raises:
+        OSError: if this machine cannot render.
+    """
     width, height = _SIZE
     figure = Figure(figsize=(width / 100, len(rows) * height / 100), dpi=100)
     axes = figure.subplots(len(rows), squeeze=False)[:, 0]
@@ -72,7 +88,7 @@ def poses_figure(
         Line2D([], [], ls="", marker="o", ms=9, color=color.rgba[:3]) for color in seen
     ]
     axes[0].legend(
-        handles, _KINDS, loc="upper right", ncols=3, fontsize=12, frameon=False
+        handles, kinds, loc="upper right", ncols=3, fontsize=12, frameon=False
     )
     return figure
 
@@ -88,9 +104,20 @@ def _poses(segment: Segment, robot: Quadruped, variant: Variant) -> list[Take]:
     points = report.scale * np.concatenate((moved.toes, *ends), axis=1)
     timing = gait_timing(clip_track(moved, robot.stand_height / report.scale), 2)
     stride = timing.stride_period if timing else _STRIDE
-    count = min(len(motion), len(points))
+    return row_of(robot, positions(motion), points, stride)
+
+
+def row_of(robot: LeggedRobot, q: Array, points: Array, stride: float) -> list[Take]:
+    """Returns poses over a stride in the middle, each a take of one frame.
+
+    Args:
+        robot: the robot.
+        q: its positions at 50 frames/s, see :class:`.Take`, shape (T, 7 + J).
+        points: points shown over them, m, shape (T, 6, 3).
+        stride: duration, s.
+    """
+    count = min(len(q), len(points))
     frames = count / 2 + stride * FPS * (np.arange(POSES) / POSES - 0.5)
-    q = positions(motion)
     takes = []
     for place, frame in enumerate(np.clip(frames.round().astype(int), 0, count - 1)):
         shift = np.append(-q[frame, 4:6], 0.0)

@@ -94,8 +94,7 @@ def test_the_end_that_is_down_stands_while_a_sole_rolls(g1):
     """From the heel over the whole sole to the toe, the formula's foot gliding on."""
     t = np.linspace(-1, 1, 60)
     pitch = np.stack((-0.4 * t**3, np.zeros(60)), axis=-1)
-    yaw = np.stack((0.3 * t, np.full(60, 0.2)), axis=-1)
-    yaw[10:50, 0] = 0.1
+    yaw = np.full((60, 2), 0.1)
     down = np.ones((60, 2), dtype=bool)
     down[:10, 0] = down[50:, 0] = False
     p_WS = np.zeros((60, 2, 3))
