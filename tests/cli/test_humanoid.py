@@ -17,8 +17,8 @@ from tests.synthetic_human import march, write_person
 def made(tmp_path_factory):
     """A data folder with a march, and one in which nobody stands."""
     folder = tmp_path_factory.mktemp("data")
-    write_person(folder / FOLDER, march(0.8))
-    floating = march(0.8)
+    write_person(folder / FOLDER, march(0.8, speed=0.6))
+    floating = march(0.8, speed=0.6)
     floating[:, 2] += 1.0
     write_person(folder / FOLDER, floating, name="float")
     return folder
