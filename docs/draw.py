@@ -10,7 +10,8 @@ headless), `retargeting` the recordings, too:
     python docs/draw.py steering
     python docs/draw.py gait-choice docs/images/gait_choice.png
     python docs/draw.py robustness docs/images/robustness.png
-    python docs/draw.py humanoid docs/images/humanoid.png
+    python docs/draw.py humanoid docs/images/humanoid.png \
+        --motions motions/g1/human-walk.npz motions/g1/human-run.npz
 
 ``loco-drake evaluate ... --figures`` draws the others, among them Figure 1 of the
 paper, models/pretrained/results/retargeted-dog-pace.webp. The README's moving picture:
@@ -33,13 +34,12 @@ from pydrake.systems.framework import DiagramBuilder
 
 from loco_drake.cli.output import write_figure
 from loco_drake.common.files import atomic_path, read_json
-from loco_drake.datasets import human
 from loco_drake.datasets.registry import data_dir
 from loco_drake.datasets.segments import read_segments, select_labels
 from loco_drake.evaluation.dataset_picture import library_figure
 from loco_drake.evaluation.gait_change import change_figure
 from loco_drake.evaluation.gait_choice_picture import choice_figure
-from loco_drake.evaluation.humanoid import person_track
+from loco_drake.evaluation.humanoid import humanoid_track
 from loco_drake.evaluation.library import read_library
 from loco_drake.evaluation.report.results import load_results, results_dir
 from loco_drake.evaluation.robustness_pictures import curves_figure
@@ -63,7 +63,7 @@ from loco_drake.motion.gait_timing import gait_timing
 from loco_drake.motion.gaits import parse_schedule
 from loco_drake.motion.momentum import positions
 from loco_drake.motion.motion import FPS
-from loco_drake.retargeting.biped import retarget_biped
+from loco_drake.motion.motion_file import load_motion
 from loco_drake.retargeting.retarget import retarget_clip
 from loco_drake.retargeting.scaling import resample
 from loco_drake.systems.gait_selector import measured_gaits
@@ -75,6 +75,7 @@ from loco_drake.systems.scenario import (
     TrainedPolicy,
 )
 from loco_drake.viewing.poses import row_of, rows_figure
+from loco_drake.viewing.source_clip import source_clip
 
 Png = tyro.conf.Positional[Path]
 
@@ -268,24 +269,27 @@ def robustness(png: Png) -> None:
     write_figure(curves_figure(found), png, dpi=80)
 
 
-def humanoid(
-    png: Png, clips: tuple[str, ...] = ("walk", "run"), data: Path | None = None
-) -> None:
-    """A person's clips on the G1, from ``data fetch --source human``."""
+def humanoid(png: Png, motions: tuple[Path, ...], data: Path | None = None) -> None:
+    """Motion of the G1 that ``loco-drake humanoid`` wrote, and the people in its size.
+
+    Args:
+        png: the picture.
+        motions: Motion files, a row for each.
+        data: folder of the recordings.
+    """
     g1 = read_biped("g1")
-    rows = []
-    for name in clips:
-        path = data_dir(data) / human.FOLDER / f"{human.PREFIX}{name}.txt"
-        clip = human.read_human(path, cycles=4)
-        motion, report = retarget_biped(clip, g1)
-        points = resample(clip.keypoints(), FPS)
-        ends = points.withers[:, None], points.hip[:, None]
-        keypoints = report.scale * np.concatenate((points.toes, *ends), axis=1)
-        timing = gait_timing(person_track(clip, g1.hip_height / report.scale))
-        stride = timing.stride_period if timing else 1.0
-        rows.append(row_of(g1, positions(motion), keypoints, stride))
+    rows, names = [], []
+    for path in motions:
+        motion = load_motion(path)
+        clip = resample(source_clip(motion, data_dir(data)), FPS)
+        ends = clip.withers[:, None], clip.hip[:, None]
+        points = np.concatenate((clip.toes, *ends), axis=1)
+        timing = gait_timing(humanoid_track(motion, g1))
+        stride = timing.stride_period if timing else motion.duration
+        rows.append(row_of(g1, positions(motion), points, stride))
+        names.append(motion.gait)
     kinds = ("toes", "heels", "neck and pelvis")
-    write_figure(rows_figure(rows, clips, kinds), png, dpi=100)
+    write_figure(rows_figure(rows, names, kinds), png, dpi=100)
 
 
 def gait_choice(png: Png) -> None:

@@ -27,10 +27,10 @@ _COLUMNS = {
     "speed ratio": ("joint_speed_ratio_max", 1.0, 2),
     "feet mm": ("toe_error_rmse_m", 1e3, 2),
     "arms mm": ("arm_error_rmse_m", 1e3, 1),
-    "correction mm": ("correction_rmse_m", 1e3, 1),
+    "moved mm": ("correction_rmse_m", 1e3, 1),
     "pelvis mm": ("trunk_correction_rmse_m", 1e3, 1),
-    "stride error %": ("stride_period_error", 1e2, 1),
-    "phase error": ("phase_lag_error", 1.0, 3),
+    "stride %": ("stride_period_error", 1e2, 1),
+    "phase": ("phase_lag_error", 1.0, 3),
 }
 
 
