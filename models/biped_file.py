@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from loco_drake.common.arrays import Array
-from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.errors import InputError, check_choice, quoted
 from loco_drake.common.typed_yaml import read_yaml
 
 from .biped import Biped
@@ -70,7 +70,10 @@ def read_biped(definition: str) -> Biped:
     elif Path(definition).suffix in (".yaml", ".yml"):
         path = Path(definition).resolve()
     else:
-        check_choice("humanoid", definition, [*BIPEDS, "a YAML file"])
+        raise InputError(
+            f"Unknown humanoid {quoted(definition)}; the choices are "
+            f"{', '.join(BIPEDS)}, or a humanoid's YAML file."
+        )
     return _read(path, definition if definition in BIPEDS else str(path))
 
 

@@ -120,7 +120,9 @@ def read_skeleton(path: Path) -> Skeleton:
             for link in link.iterfind("collision")
         }
     except (ET.ParseError, KeyError, ValueError, AttributeError):
-        raise InputError(f"{path} is not the URDF of a person as pybullet has it.")  # noqa: B904
+        raise InputError(
+            f"{path} is not the URDF of a person as pybullet has it."
+        ) from None
     centre, size = np.array(box)
     ends = np.array([[-size[0] / 2, -size[1] / 2, 0], [size[0] / 2, -size[1] / 2, 0]])
     return Skeleton(parents, offsets, centre + ends)
