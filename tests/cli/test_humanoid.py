@@ -38,7 +38,7 @@ def test_clips_become_motion_that_can_be_played(made, tmp_path, capsys, monkeypa
     assert done["penetration_max_m"] < 1e-3
     assert done["stride_period_error"] is None  # of two strides
     motion = load_motion(tmp_path / done["path"])
-    assert (motion.robot, len(motion), len(motion.joint_names)) == ("g1", 81, 29)
+    assert (motion.robot, len(motion), len(motion.joint_names)) == ("g1", 79, 29)
     assert motion.provenance["cycles"].startswith("2, closed by")
     assert main(["play", done["path"], "--html", "a.html"]) == 0
     assert "left_ankle_roll_link" in (tmp_path / "a.html").read_text()

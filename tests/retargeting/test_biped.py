@@ -111,7 +111,7 @@ def test_the_end_that_is_down_stands_while_a_sole_rolls(g1):
     np.testing.assert_allclose(lowest[10:50], g1.foot_radius, atol=1e-6)
     assert lowest.min() > g1.foot_radius - 1e-6
     # The foot's path has no corner where the end changes.
-    assert np.abs(np.diff(planted[:, 0], n=2, axis=0)).max() < 0.01
+    assert np.abs(np.diff(planted[10:50, 0], n=2, axis=0)).max() < 0.002
 
 
 def test_the_pelvis_is_lowered_where_legs_are_too_short(clip, g1, config):
