@@ -92,10 +92,10 @@ def _played(
         return once
 
 
-def pose(skeleton: Skeleton, capture: Capture, unit: float = UNIT) -> dict[str, Array]:
+def pose(skeleton: Skeleton, capture: Capture) -> dict[str, Array]:
     """Returns the points of a body by name, in m and the file's axes, (T, 3) each.
 
-    They are joints, and heels and toes at the sole; ``unit`` is the skeleton's, in m.
+    They are joints, and heels and toes at the sole.
     """
     q = {"root": capture.rotations["root"]}
     p = {"root": np.zeros_like(capture.root)}
@@ -107,7 +107,7 @@ def pose(skeleton: Skeleton, capture: Capture, unit: float = UNIT) -> dict[str, 
         ankle = f"{side}_ankle"
         for end, offset in zip(("heel", "toe"), skeleton.soles, strict=True):
             p[f"{side}_{end}"] = p[ankle] + quat_rotate(q[ankle], offset)
-    return {name: capture.root + unit * points for name, points in p.items()}
+    return {name: capture.root + UNIT * points for name, points in p.items()}
 
 
 def repeated(capture: Capture, cycles: int) -> Capture:
