@@ -106,8 +106,8 @@ def _check(file: BipedFile) -> None:
         if len({len(limb.joints) for limb in limbs.values()}) > 1:
             raise InputError(f"Both {name} must have as many joints.")
         for side, limb in limbs.items():
-            needed = ("joints", "stand", "end", *(("middle",) * (name == "arms")))
-            if missing := [key for key in needed if not getattr(limb, key)]:
+            parts = ["joints", "stand", "end", *["middle"] * (name == "arms")]
+            if missing := [key for key in parts if not getattr(limb, key)]:
                 raise InputError(f"{name}: {side} lacks {', '.join(missing)}.")
             if len(limb.stand) != len(limb.joints) or not np.isfinite(limb.stand).all():
                 raise InputError(
