@@ -3,7 +3,7 @@
 The tree is another, the formula is that of :mod:`.scaling`: directions along the tree
 are kept, lengths are scaled. The legs' scale is the ratio of stance heights; arms reach
 for nothing, so each of their bones has the robot's own length. With the pelvis P midway
-between the hips, and H its stance height,
+between the hips, and H its stance height::
 
     alpha  = hip_height of the robot / H
     R_WB   : y from the right hip to the left one, z toward the waist

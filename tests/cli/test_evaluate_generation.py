@@ -244,7 +244,7 @@ def test_bad_options_are_refused(options, message, recordings, weights, tmp_path
 
 def test_motions_that_cannot_be_scored(recordings, recorded, tmp_path):
     options = {"data_dir": recordings, "motions": tmp_path / "motions"}
-    with pytest.raises(InputError, match="no Motion files"):
+    with pytest.raises(InputError, match="no folder of Motion files"):
         EvaluateGeneration(**options).run()
     path = tmp_path / "motions" / "a.npz"
     motion = recorded.train[0]

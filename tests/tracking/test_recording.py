@@ -101,5 +101,5 @@ def test_command_writes_what_went_well(robot, trot, tmp_path, capsys):
     assert command("--least-return", 100) == 1
     assert command("--no-ground", "--out", tmp_path / "plain") == 0
     assert not load_motion(tmp_path / "plain" / "good.npz").grounded
-    with pytest.raises(InputError, match="no Motion files"):
+    with pytest.raises(InputError, match="no folder of Motion files"):
         tyro.cli(Record, args=["--motions", str(tmp_path / "none")]).run()
