@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -23,7 +23,7 @@ from loco_drake.retargeting.biped_scaling import (
     scale_to_biped,
     upper_marks,
 )
-from loco_drake.retargeting.bounds import outside_bounds
+from loco_drake.retargeting.bounds import judged
 from loco_drake.retargeting.contacts import (
     UPRIGHT,
     detect_contacts,
@@ -170,12 +170,7 @@ def retarget_biped(
         lowest_joint_m=_lowest_joint(motion, robot),
         unsolved_frames=int((~solved).sum()),
     )
-    report = replace(report, warnings=outside_bounds(asdict(report), robot))
-    kept = ("scale", "toe_error_rmse_m", "correction_rmse_m")
-    figures = {name: f"{getattr(report, name):.6g}" for name in kept}
-    if report.warnings:
-        figures["warnings"] = "; ".join(report.warnings)
-    return replace(motion, provenance={**motion.provenance, **figures}), report
+    return judged(motion, report, robot)
 
 
 def follow(

@@ -1,14 +1,21 @@
 """Warnings where a figure of a retargeted clip is outside its bound in bounds.yaml."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydrake.common.yaml import yaml_load
 
 from loco_drake.models.legged import LeggedRobot
+from loco_drake.motion.motion import Motion
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+# Of one clip: a dataclass with a field ``warnings`` beside its figures.
+Report = TypeVar("Report", bound="DataclassInstance")
 
 _FILE = Path(__file__).with_suffix(".yaml")
 
@@ -60,3 +67,17 @@ def outside_bounds(figures: Mapping[str, Any], robot: LeggedRobot) -> tuple[str,
             shown = f"{shown} ({figures['on_feet_frames']})"
         found.append(f"{bound.name} {shown}, not {limits}")
     return tuple(found)
+
+
+def judged(motion: Motion, report: Report, robot: LeggedRobot) -> tuple[Motion, Report]:
+    """Returns a motion and the report on it, with sentences on what is out of bounds.
+
+    The motion's provenance tells the report's main figures, and these sentences.
+    """
+    warnings = outside_bounds(asdict(report), robot)
+    kept = ("scale", "toe_error_rmse_m", "correction_rmse_m")
+    figures = {name: f"{getattr(report, name):.6g}" for name in kept}
+    if warnings:
+        figures["warnings"] = "; ".join(warnings)
+    motion = replace(motion, provenance={**motion.provenance, **figures})
+    return motion, replace(report, warnings=warnings)

@@ -22,7 +22,7 @@ from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.motion.motion import FPS, Motion, make_motion
 from loco_drake.motion.motion_file import motion_bytes, write_motion
-from loco_drake.retargeting.bounds import outside_bounds
+from loco_drake.retargeting.bounds import judged
 from loco_drake.retargeting.contacts import (
     detect_contacts,
     frames_on_feet,
@@ -162,12 +162,7 @@ def retarget_clip(
         unsolved_frames=int((~solved).sum()),
         grounding=grounding,
     )
-    report = replace(report, warnings=outside_bounds(asdict(report), robot))
-    kept = ("scale", "toe_error_rmse_m", "correction_rmse_m")
-    figures = {name: f"{getattr(report, name):.6g}" for name in kept}
-    if report.warnings:
-        figures["warnings"] = "; ".join(report.warnings)
-    return replace(motion, provenance={**motion.provenance, **figures}), report
+    return judged(motion, report, robot)
 
 
 @dataclass(frozen=True)
