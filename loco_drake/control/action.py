@@ -5,14 +5,12 @@ from functools import lru_cache
 import numpy as np
 
 from loco_drake.common.arrays import Array, read_only
-from loco_drake.common.gravity import GRAVITY
-from loco_drake.common.rotations import quat_conjugate, quat_rotate
+from loco_drake.control.feed_forward import feed_forward_torques, mid_samples
 from loco_drake.control.plan import PLAN_DT, Plan
-from loco_drake.control.state import JOINT_VELOCITIES, JOINTS, ORIENTATION, VELOCITY
+from loco_drake.control.state import JOINT_VELOCITIES, JOINTS
 from loco_drake.models.robots import Robot
 
 ACTION_SCALE = 0.15  # rad per unit of action: 15 Nm on both robots
-MAX_LOAD = 2.5  # robot weights
 
 
 def joint_targets(set_points: Array, action: Array) -> Array:
@@ -27,16 +25,19 @@ def joint_targets(set_points: Array, action: Array) -> Array:
     return np.concatenate((q_d, np.zeros_like(q_d)), axis=-1)
 
 
-@lru_cache(maxsize=4)  # A plan is immutable, and sampled at 50 Hz.
+@lru_cache(maxsize=4)  # A plan is immutable.
 def set_points(robot: Robot, plan: Plan) -> Array:
     """Returns the PD set-points that track ``plan``, rad, shape (N, J).
 
-    They are q + (d v + tau) / kp with the torques tau of :func:`feed_forward_torques`
-    and d = :func:`velocity_gain`.
+    Row k is held for the control period that ends at sample k. In it the PD is to
+    apply, on average, the torques tau of :func:`feed_forward_torques`. With the mean
+    velocity v of the period they are q + (d v + tau) / kp with d =
+    :func:`velocity_gain`.
     """
-    torques = feed_forward_torques(robot, plan)
-    ahead = (velocity_gain(robot) * plan.v[JOINT_VELOCITIES] + torques) / robot.kp
-    return read_only(plan.q[JOINTS] + ahead)
+    _, v, _ = mid_samples(plan)
+    ahead = velocity_gain(robot) * v[JOINT_VELOCITIES]
+    ahead = ahead + feed_forward_torques(robot, plan)
+    return read_only(plan.q[JOINTS] + ahead / robot.kp)
 
 
 def velocity_gain(robot: Robot) -> Array:
@@ -47,23 +48,3 @@ def velocity_gain(robot: Robot) -> Array:
     T / 2 kp v of that torque is there already: the gain is kd - T / 2 kp.
     """
     return robot.kd - PLAN_DT / 2 * robot.kp
-
-
-def feed_forward_torques(robot: Robot, plan: Plan) -> Array:
-    """Returns approximate joint torques of a plan, N m, shape (N, J).
-
-    The feet in contact share the vertical force m (g + a), where a is the base's
-    planned acceleration, equally. The joints balance this force, tau = -J^T f, and
-    accelerate their own inertia in the standing pose. The weight and coupling of the
-    legs are neglected. Such a feed-forward reduces the samples that a tracker needs
-    (Fuchioka et al. 2023, OPT-Mimic).
-    """
-    contacts = plan.contacts
-    load = np.clip(1 + plan.vdot[VELOCITY][:, 2] / GRAVITY, 0.0, MAX_LOAD)
-    share = contacts / np.maximum(contacts.sum(axis=1, keepdims=True), 1)
-    force = robot.mass * GRAVITY * load[:, None] * share  # (N, 4)
-    up_B = quat_rotate(quat_conjugate(plan.q[ORIENTATION]), np.array([0.0, 0.0, 1.0]))
-    # (N, 4, 3 rows x y z, 3 joints) against (N, 3)
-    lift = np.einsum("nlij,ni->nlj", robot.toe_jacobians(plan.q[JOINTS]), up_B)
-    support = (-force[..., None] * lift).reshape(len(plan), -1)
-    return support + robot.joint_inertia * plan.vdot[JOINT_VELOCITIES]

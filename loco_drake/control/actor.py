@@ -27,6 +27,7 @@ from loco_drake.common.weights import (
     save_weights,
 )
 from loco_drake.control.action import ACTION_SCALE
+from loco_drake.control.feed_forward import FEED_FORWARD
 from loco_drake.control.history import (
     FRAME,
     FRAME_PLACES,
@@ -52,6 +53,8 @@ from loco_drake.models.robots import Robot, get_robot
 from loco_drake.motion.motion import FPS
 
 KIND = "policy"
+# The feed-forward of policies whose files do not name it: equal shares of the weight.
+_FIRST_FEED_FORWARD = "weight"
 _LEARNER = "learner/"  # prefix of tensors that only a training needs
 OBSERVATION_CLIP = 5.0  # standard deviations
 # Parts of the observation that need the base's position in the world or its velocity.
@@ -103,6 +106,8 @@ class ActorConfig:
     )
     action_scale: float = ACTION_SCALE  # rad per unit of action
     rate: float = FPS  # actions per second
+    # The feed-forward that the actions add to.
+    feed_forward: str = FEED_FORWARD
     # Whether the policy observes PRIVILEGED parts, which a robot outside simulation
     # does not know well.
     privileged: bool = True
@@ -302,15 +307,26 @@ def split_learner(
     return actor, learner
 
 
+def read_actor_config(header: Any, path: Path) -> ActorConfig:
+    """Returns the configuration in the header of a policy file.
+
+    Raises:
+        InputError: if the header is damaged.
+    """
+    if isinstance(header, dict):
+        header = {"feed_forward": _FIRST_FEED_FORWARD, **header}
+    return read_config(ActorConfig, header, path)
+
+
 def load_actor(path: Path, robot: Robot) -> Actor:
     """Reads a policy for ``robot``.
 
     Raises:
         InputError: if the file is damaged, or was trained for another robot or with
-            another observation, action scale or rate.
+            another observation, action scale, rate or feed-forward.
     """
     tensors, header = load_weights(path, KIND)
-    config = read_config(ActorConfig, header, path)
+    config = read_actor_config(header, path)
     free = {name: getattr(config, name) for name in _FREE}
     expected = ActorConfig(robot=robot.name, **free)
     for name, value in asdict(expected).items():

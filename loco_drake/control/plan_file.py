@@ -8,7 +8,8 @@ import numpy as np
 
 from loco_drake import __version__
 from loco_drake.common.files import atomic_path
-from loco_drake.control.action import feed_forward_torques, set_points
+from loco_drake.control.action import set_points
+from loco_drake.control.feed_forward import feed_forward_torques
 from loco_drake.control.observation import LOOK_AHEAD
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.models.legs import LEGS
@@ -26,7 +27,7 @@ ARRAYS = {
     "contacts": "bool, (N, 4): whether each foot is in stance",
     "labels": "text, (N,): source-gait",
     "set_points": "rad, (N, 12): of the PD, in the period that ends at the sample",
-    "feed_forward": "Nm, (N, 12): joint torques that set_points contain",
+    "feed_forward": "Nm, (N, 12): mean joint torques that set_points contain",
     "path_time": "s, (N,): time in the motion before smoothing",
 }
 

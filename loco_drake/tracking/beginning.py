@@ -15,8 +15,14 @@ from loco_drake.common import run_folder
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import Checkpoint
-from loco_drake.common.weights import kind_of, load_into, load_weights, read_config
-from loco_drake.control.actor import KIND, ActorConfig, save_actor, split_learner
+from loco_drake.common.weights import kind_of, load_into, load_weights
+from loco_drake.control.actor import (
+    KIND,
+    ActorConfig,
+    read_actor_config,
+    save_actor,
+    split_learner,
+)
 from loco_drake.control.observation import OBSERVATION_LAYOUT
 from loco_drake.tracking.ppo import AdaptivePPO, actor_layers, export_actor
 
@@ -94,7 +100,7 @@ def read_beginning(path: Path, hidden: list[int]) -> Beginning:
 def _of_policy(path: Path) -> tuple[Beginning, list[int], list[list[Any]]]:
     """Returns the beginning in a policy file, its widths and observation layout."""
     tensors, header = load_weights(path, KIND)
-    config = read_config(ActorConfig, header, path)
+    config = read_actor_config(header, path)
     actor, learner = split_learner(tensors)
     if not learner:
         raise InputError(

@@ -8,8 +8,14 @@ is due now; q_J and v_J are the joints. R' is the transpose of R.
 from typing import Any, NamedTuple
 
 from loco_drake.common.gravity import GRAVITY
-from loco_drake.control.action import MAX_LOAD, velocity_gain
+from loco_drake.control.action import velocity_gain
 from loco_drake.control.actor import PRIVILEGED, Actor
+from loco_drake.control.feed_forward import (
+    DAMPING,
+    FRICTION,
+    MAX_LOAD,
+    MOMENT_WEIGHT,
+)
 from loco_drake.control.observation import (
     LOOK_AHEAD,
     OBSERVATION_LAYOUT,
@@ -25,7 +31,7 @@ from loco_drake.models.robots import Robot
 from loco_drake.motion.gaits import GAITS, SOURCES
 from loco_drake.tracking.deployment_vectors import TOLERANCE, make_vectors
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 class Part(NamedTuple):
@@ -62,12 +68,19 @@ PARTS = {
 SAMPLES = {"now": [0], "next": [1], "ahead": LOOK_AHEAD.tolist()}
 
 FORMULAS = {
-    "set_points": "q_J + (velocity_gain v_J + tau) / kp of the plan's sample n + 1",
+    "set_points": (
+        "q_J of the plan's sample n + 1, plus (velocity_gain v_J + tau) / kp with v "
+        "the mean of the samples n and n + 1"
+    ),
     "feed_forward": (
-        "tau = -J' R_WP' (0, 0, f) + joint_inertia vdot_J, J the leg's "
-        "d p_PF / d q_J, "
-        "f = mass g clip(1 + vdot_z / g, 0, max_load) / number of feet in stance, "
-        "0 of a foot in swing"
+        "tau = (M vdot + h)_J - sum of J' f over the feet in stance at n + 1; M and h "
+        "are mass matrix and bias forces, gravity included, at the mean q and v of the "
+        "samples n and n + 1, vdot = (v(n + 1) - v(n)) / period, and J is d p_WF / d "
+        "q_J. The forces f minimize |w (G f - (M vdot + h)_B)|^2 + damping |f - f_0|^2 "
+        "with G f their moment about and their force on the base, w = moment_weight of "
+        "moments and 1 of forces, and f_0 = (0, 0, mass max(0, g + vdot_z) / number of "
+        "feet in stance). Then f_z is clipped to 0 .. max_load mass g, and the "
+        "horizontal part shortened to friction f_z"
     ),
     "target": "q_d = set_points + scale * action, held until the next action",
     "torque": "clip(kp (q_d - q_J) - kd v_J, -effort, effort)",
@@ -128,11 +141,9 @@ def deployment(actor: Actor, robot: Robot) -> dict[str, Any]:
             "mass_kg": robot.mass,
             "g_mps2": GRAVITY,
             "max_load": MAX_LOAD,
-            "joint_inertia_kgm2": robot.joint_inertia.tolist(),
-            "p_BHip_m": robot.p_BHip.tolist(),
-            "abduction_offset_m": robot.abduction_offset.tolist(),
-            "thigh_length_m": robot.thigh_length,
-            "calf_length_m": robot.calf_length,
+            "friction": FRICTION,
+            "moment_weight_per_m": MOMENT_WEIGHT,
+            "damping": DAMPING,
         },
         "pd": {
             "torque": FORMULAS["torque"],

@@ -25,7 +25,7 @@ def make_vectors(actor: Actor, robot: Robot) -> list[dict[str, Any]]:
 
     - q (19,), v (18,), last_action (12,): the state of the robot and its last action
     - plan_q (K, 19), plan_v (K, 18), plan_contacts (K, 4): the K samples ahead of the
-      plan, and of the first of them plan_vdot (18,)
+      plan; plan_q_now (19,), plan_v_now (18,): the sample that is due
     - label: the plan's
     - observation, action (12,), set_points (12,) of the plan, and target (12,), what
       the PD is given
@@ -67,7 +67,8 @@ def _vector(
         "plan_q": ahead.q,
         "plan_v": ahead.v,
         "plan_contacts": ahead.contacts.astype(np.float64),
-        "plan_vdot": plan.vdot[1],
+        "plan_q_now": plan.q[0],
+        "plan_v_now": plan.v[0],
         "observation": observation,
         "action": action,
         "set_points": due,

@@ -21,9 +21,8 @@ from loco_drake.tracking.deployment import deployment, ignored_parts
 
 SET_POINTS = (
     "every 1 / rate s: q_d = q + (velocity_gain v + tau) / kp + action_scale * action, "
-    "v_d = 0; "
-    "q, v and the feed-forward torques tau are the plan's one period later; the motors "
-    "give kp (q_d - q_measured) - kd v_measured"
+    "v_d = 0; q is the plan's one period later, v and the feed-forward torques tau "
+    "are means of that period; the motors give kp (q_d - q_measured) - kd v_measured"
 )
 
 

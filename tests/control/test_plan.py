@@ -6,14 +6,11 @@ import numpy as np
 import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import JacobianWrtVariable
 
 from loco_drake.common.errors import InputError
-from loco_drake.control.action import set_points
 from loco_drake.control.plan import (
     PLAN_DT,
     join_plans,
-    make_plan,
     plan_from_motion,
     standing_plan,
 )
@@ -159,47 +156,3 @@ def test_a_plan_has_the_gait_of_each_frame(go2):
 def test_the_standing_plan_has_its_soles_on_the_ground(go2):
     plan = standing_plan(go2)
     np.testing.assert_allclose(plan.p_WF[0, :, 2], go2.foot_radius, atol=1e-12)
-
-
-def feed_forward(robot, plan):
-    """The mean torques of the PD over a period at whose end all is as planned."""
-    ahead = set_points(robot, plan) - (plan.q[:, 7:] - 0.01 * plan.v[:, 6:])
-    return robot.kp * ahead - robot.kd * plan.v[:, 6:]
-
-
-def test_feed_forward_of_standing_feet_carries_the_weight(go2, plant):
-    """By Drake's Jacobians: the toes' forces and the joints' torques balance."""
-    plan = standing_plan(go2)
-    context = plant.CreateDefaultContext()
-    plant.SetPositions(context, plan.q[0])
-    generalized = np.zeros(plant.num_velocities())
-    for leg in LEGS:
-        frame = plant.GetFrameByName(f"{leg}_foot")
-        J = plant.CalcJacobianTranslationalVelocity(
-            context,
-            JacobianWrtVariable.kV,
-            frame,
-            np.zeros(3),
-            plant.world_frame(),
-            plant.world_frame(),
-        )
-        generalized += J.T @ [0.0, 0.0, plant.CalcTotalMass(context) * 9.81 / 4]
-    np.testing.assert_allclose(feed_forward(go2, plan)[0], -generalized[6:], atol=1e-9)
-
-
-def test_feed_forward_without_contact_is_what_accelerates_the_joints(go2):
-    """A joint that speeds up by 10 rad/s in a second: tau = I * 10."""
-    rest = standing_plan(go2)
-    count = 51
-    v = np.zeros((count, 18))
-    v[:, 8] = np.linspace(0, 10, count)
-    plan = make_plan(
-        go2,
-        q=np.repeat(rest.q, count, axis=0),
-        v=v,
-        contacts=np.zeros((count, 4), dtype=bool),
-        labels=np.zeros(count, dtype=int),
-    )
-    expected = np.zeros(12)
-    expected[2] = go2.joint_inertia[2] * 10
-    np.testing.assert_allclose(feed_forward(go2, plan)[25], expected, atol=1e-9)

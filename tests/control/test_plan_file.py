@@ -40,10 +40,12 @@ def test_set_points_are_what_joint_targets_outputs_without_an_action(
         simulator.AdvanceTo((n + 0.5) * PLAN_DT)
         desired = targets.GetOutputPort("desired_state").Eval(own)
         np.testing.assert_array_equal(desired[:12], arrays["set_points"][n + 1])
-    # By hand: kp is 100 Nm/rad, and 2 Nm s/rad of the planned velocity are added.
-    expected = arrays["q"][:, 7:] + arrays["v"][:, 6:] * 0.02
-    expected += arrays["feed_forward"] / 100
-    np.testing.assert_allclose(arrays["set_points"], expected, atol=1e-12)
+    # By hand: kp is 100 Nm/rad, and 2 Nm s/rad of the planned velocity, which is the
+    # mean of two samples, are added.
+    v = arrays["v"][:, 6:]
+    expected = arrays["q"][1:, 7:] + (v[:-1] + v[1:]) * 0.01
+    expected += arrays["feed_forward"][1:] / 100
+    np.testing.assert_allclose(arrays["set_points"][1:], expected, atol=1e-12)
 
 
 def test_it_holds_the_samples_that_a_policy_needs(go2, trot, tmp_path):

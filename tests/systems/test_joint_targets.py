@@ -2,7 +2,8 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from loco_drake.control.action import ACTION_SCALE, feed_forward_torques
+from loco_drake.control.action import ACTION_SCALE
+from loco_drake.control.feed_forward import feed_forward_torques
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.control import JointTargets, PlanPlayer
@@ -30,7 +31,7 @@ def test_targets_are_the_next_sample_the_action_and_the_feed_forward(go2, trot):
     # The last sampling was at sample 20; 100 Nm/rad and 2 Nm s/rad are the Go2's.
     torques = feed_forward_torques(get_robot("go2"), trot)
     expected = trot.q[21, 7:] + ACTION_SCALE * action
-    expected += (2 * trot.v[21, 6:] + torques[21]) / 100
+    expected += (trot.v[20, 6:] + trot.v[21, 6:] + torques[21]) / 100
     np.testing.assert_allclose(desired[:12], expected, atol=1e-12)
     np.testing.assert_array_equal(desired[12:], 0)
     np.testing.assert_array_equal(diagram.GetOutputPort("action").Eval(context), action)

@@ -7,6 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import JacobianWrtVariable
 
 from loco_drake.control.actor import PRIVILEGED, ActorConfig
 from loco_drake.control.actor import make_actor as make_network
@@ -74,48 +77,67 @@ def test_it_tells_of_a_memory(go2):
     assert all(case["memory"][0] == 1 for case in others)
 
 
-def toes(about, joints):
-    """Toes in B from the lengths in the file, leg by leg, by rotation matrices."""
-    lengths = about["feed_forward"]
-    p_BF = []
-    for leg in range(4):
-        a, b, c = joints[3 * leg : 3 * leg + 3]
-        thigh = np.array([0, 0, -lengths["thigh_length_m"]])
-        calf = np.array([0, 0, -lengths["calf_length_m"]])
-        offset = np.array([0, lengths["abduction_offset_m"][leg], 0])
-        leg_vector = about_y(b) @ (thigh + about_y(c) @ calf)
-        p_BF.append(lengths["p_BHip_m"][leg] + about_x(a) @ (offset + leg_vector))
-    return np.array(p_BF)
+@pytest.fixture(scope="module")
+def plant_of():
+    """Of each robot a plant of its own, which knows nothing of ground or gains."""
+
+    def make(name):
+        plant = MultibodyPlant(0.0)
+        get_robot(name).AddModel(Parser(plant))
+        plant.Finalize()
+        return plant, plant.CreateDefaultContext()
+
+    return {name: make(name) for name in ROBOTS}
 
 
-def about_x(angle):
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
-
-
-def about_y(angle):
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-
-
-def feed_forward(about, q, vdot, contacts):
-    """Torques by the page's formula, with a Jacobian by differences."""
+def feed_forward(about, plant, context, case):
+    """Torques by the page's formula, from mass matrix and one least-squares problem."""
     given = about["feed_forward"]
-    load = np.clip(1 + vdot[5] / given["g_mps2"], 0, given["max_load"])
-    force = given["mass_kg"] * given["g_mps2"] * load * contacts
-    force /= max(sum(contacts), 1)
-    w, x, y, z = q[:4]
-    up_P = np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
-    tau = given["joint_inertia_kgm2"] * vdot[6:]
-    for joint in range(12):
-        step = np.zeros(12)
-        step[joint] = 1e-6
-        column = (toes(about, q[7:] + step) - toes(about, q[7:] - step)) / 2e-6
-        tau[joint] -= np.sum(force * (column @ up_P))
-    return tau
+    q0, q1 = case["plan_q_now"], case["plan_q"][0]
+    v0, v1 = case["plan_v_now"], case["plan_v"][0]
+    q, v = (q0 + q1) / 2, (v0 + v1) / 2
+    q[:4] /= np.linalg.norm(q[:4])
+    vdot = (v1 - v0) / about["network"]["period_s"]
+    plant.SetPositions(context, q)
+    plant.SetVelocities(context, v)
+    M = plant.CalcMassMatrix(context)
+    needed = M @ vdot + plant.CalcBiasTerm(context)
+    needed -= plant.CalcGravityGeneralizedForces(context)
+    world, standing = plant.world_frame(), case["plan_contacts"][0].astype(bool)
+    J = np.vstack(
+        [
+            plant.CalcJacobianTranslationalVelocity(
+                context,
+                JacobianWrtVariable.kV,
+                plant.GetFrameByName(f"{leg}_foot"),
+                np.zeros(3),
+                world,
+                world,
+            )
+            for leg, stands in zip(about["legs"], standing, strict=True)
+            if stands
+        ]
+        or [np.zeros((0, 18))]
+    )
+    count = len(J) // 3
+    load = given["mass_kg"] * max(0, given["g_mps2"] + vdot[5])
+    f0 = np.tile([0.0, 0.0, load / max(count, 1)], count)
+    w = np.repeat([given["moment_weight_per_m"], 1.0], 3)
+    rows = np.vstack(
+        (w[:, None] * J[:, :6].T, given["damping"] ** 0.5 * np.eye(len(J)))
+    )
+    wanted = np.concatenate((w * needed[:6], given["damping"] ** 0.5 * f0))
+    f = np.linalg.lstsq(rows, wanted)[0].reshape(count, 3)
+    weight = given["mass_kg"] * given["g_mps2"]
+    f[:, 2] = np.clip(f[:, 2], 0, given["max_load"] * weight)
+    for force in f:
+        along = np.hypot(*force[:2])
+        if along > given["friction"] * force[2]:
+            force[:2] *= given["friction"] * force[2] / along
+    return needed[6:] - J[:, 6:].T @ f.ravel()
 
 
-def test_set_points_follow_from_the_file_alone(about):
+def test_set_points_follow_from_the_formulas(about, plant_of):
     """And targets from set-points and actions, in five cases that differ."""
     cases = about["test_vectors"]
     assert len(cases) == 5
@@ -124,15 +146,15 @@ def test_set_points_follow_from_the_file_alone(about):
     scale = about["action"]["scale_rad"]
     for case in cases:
         case = {k: np.array(x) for k, x in case.items()}
-        q, v, vdot = case["plan_q"][0], case["plan_v"][0], case["plan_vdot"]
-        tau = feed_forward(about, q, vdot, case["plan_contacts"][0])
-        expected = q[7:] + (gain * v[6:] + tau) / kp
+        v = (case["plan_v_now"] + case["plan_v"][0])[6:] / 2
+        tau = feed_forward(about, *plant_of[about["robot"]], case)
+        expected = case["plan_q"][0][7:] + (gain * v + tau) / kp
         np.testing.assert_allclose(case["set_points"], expected, atol=1e-6)
         target = case["set_points"] + scale * case["action"]
         np.testing.assert_allclose(case["target"], target, atol=1e-12)
-    # Among them are forces below and above the weight, and both signs of a quaternion.
-    loads = [1 + case["plan_vdot"][5] / 9.81 for case in cases]
-    assert max(loads) > 1 > min(loads)
+    # Among them are plans that speed up and slow down, and both signs of a quaternion.
+    up = [case["plan_v"][0][5] - case["plan_v_now"][5] for case in cases]
+    assert max(up) > 0 > min(up)
     signs = {np.sign(np.dot(c["q"][:4], c["plan_q"][0][:4])) for c in cases}
     assert signs == {-1, 1}
 

@@ -94,7 +94,7 @@ def test_the_file_says_all_that_running_it_takes(exported):
 def test_five_test_vectors_are_what_the_file_computes(exported):
     _, session, _ = exported
     about = json.loads(session.get_modelmeta().custom_metadata_map["deployment"])
-    assert about["schema_version"] == 1
+    assert about["schema_version"] == 2
     cases = about["test_vectors"]
     seen = np.array([case["observation"] for case in cases])
     assert seen.shape == (5, OBSERVATION_SIZE)
