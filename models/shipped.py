@@ -109,7 +109,7 @@ def policy_path(robot: "Robot", policy: Path | None = None) -> Path:
     """Returns the weights file of a policy.
 
     ``policy`` is a weights file, which is returned as it is, or the name of a shipped
-    variant, such as "randomized"; by default it is the robot's main policy: the shipped
+    variant, such as "unprivileged"; by default it is the robot's main policy: the shipped
     one, or that in the folder that the robot's file names.
 
     Raises:
@@ -146,7 +146,7 @@ def training_path(name: Path) -> Path:
     """Returns the file that a training starts from.
 
     ``name`` is a file, which is returned as it is, or a shipped policy: a robot, or a
-    robot and a variant, such as "a1_randomized".
+    robot and a variant, such as "a1_unprivileged".
 
     Raises:
         InputError: if there is neither; names the shipped policies.

@@ -41,11 +41,11 @@ def test_options_reach_the_training(references, tmp_path, capsys):
 @pytest.mark.slow
 def test_a_shipped_policy_can_be_started_from(references, tmp_path):
     """The A1's for a Go2: five steps of Adam at its learning rate hardly change it."""
-    options = "--start-from a1_randomized --steps 64 --batch 64 --workers 1"
+    options = "--start-from a1 --steps 64 --batch 64 --workers 1"
     out = tmp_path / "run"
     assert train(references, *options.split(), "--out", str(out)) == 0
     a1, go2 = get_robot("a1"), get_robot("go2")
-    shipped = load_actor(pretrained_path("policy_a1_randomized"), a1)
+    shipped = load_actor(pretrained_path("policy_a1"), a1)
     learned = load_actor(out / "policy.safetensors", go2)
     with torch.no_grad():
         for old, new in zip(
