@@ -19,8 +19,8 @@ from pydrake.systems.framework import Context
 from .movable_ground import AddMovableGround, HasMovableGround, ground_shapes
 
 # Stiff enough that the feet determine the stiffness of the contact:
-# k = k_foot k_ground / (k_foot + k_ground).
-_STIFFNESS = 1e9
+# k = k_foot k_ground / (k_foot + k_ground). N/m.
+STIFFNESS = 1e9
 
 # Of the feet, s/m. A contact uses the mean of both, weighted by the other's stiffness.
 _FOOT_DISSIPATION = 1.0
@@ -50,7 +50,7 @@ def AddGround(
     properties = ProximityProperties()
     AddContactMaterial(
         dissipation=0.0,
-        point_stiffness=_STIFFNESS,
+        point_stiffness=STIFFNESS,
         friction=CoulombFriction(friction, friction),
         properties=properties,
     )

@@ -109,8 +109,8 @@ def policy_path(robot: "Robot", policy: Path | None = None) -> Path:
     """Returns the weights file of a policy.
 
     ``policy`` is a weights file, which is returned as it is, or the name of a shipped
-    variant, such as "unprivileged"; by default it is the robot's main policy: the shipped
-    one, or that in the folder that the robot's file names.
+    variant, such as "unprivileged"; by default it is the robot's main policy: the
+    shipped one, or that in the folder that the robot's file names.
 
     Raises:
         InputError: if there is no such policy; names the existing ones.

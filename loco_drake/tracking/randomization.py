@@ -92,6 +92,9 @@ class RandomizationConfig:
     roughness: Range = None
     # Sensor errors, as a multiple of the standard deviations in docs/tracking.md.
     noise: Multiple = None
+    # Share of the worlds that are like the model but for their pushes, so that a policy
+    # stays exact there.
+    nominal_share: float = 0.0
 
     def check(
         self, robot: "Robot | None" = None, plant: "PlantConfig | None" = None
@@ -128,6 +131,7 @@ class RandomizationConfig:
             check_strength(robot, plant or PlantConfig(), weakest)
         if self.noise is not None:
             check_bounds("The randomization's noise", self.noise, 0)
+        check_bounds("The randomization's nominal_share", self.nominal_share, 0, 1)
 
     def with_standard(self) -> "RandomizationConfig":
         """Returns a copy in which every part that is off is as in STANDARD."""
@@ -157,7 +161,12 @@ class RandomizationConfig:
     @property
     def changes_physics(self) -> bool:
         """Whether worlds differ from the model in more than what is measured."""
-        others = replace(self, noise=None, push_interval=STANDARD.push_interval)
+        others = replace(
+            self,
+            noise=None,
+            push_interval=STANDARD.push_interval,
+            nominal_share=STANDARD.nominal_share,
+        )
         return others != RandomizationConfig()
 
     @property
@@ -182,6 +191,8 @@ class RandomizationConfig:
                 return None
             return random.uniform(bounds[0], bounds[1], size)
 
+        if self.nominal_share > 0 and random.uniform() < self.nominal_share:
+            return self._nominal(self._draw_pushes(robot, random, start, end))
         log_stiffness = self.stiffness and np.log(self.stiffness)
         friction, stiffness = uniform(self.friction), uniform(log_stiffness)
         return Domain(
@@ -202,6 +213,24 @@ class RandomizationConfig:
             damping=uniform(self.damping),
             joint_friction=uniform(self.joint_friction) or 0.0,
             terrain=self._draw_terrain(random),
+        )
+
+    def _nominal(self, pushes: tuple[Push, ...]) -> Domain:
+        """Returns the model's world. A Context keeps what a domain does not give."""
+        from loco_drake.models.ground import STIFFNESS
+        from loco_drake.models.plant import PlantConfig
+
+        nothing = np.zeros(len(BIAS))
+        sensors = SensorErrors(bias=nothing, white=nothing, seed=0)
+        return Domain(
+            friction=None if self.friction is None else PlantConfig().friction,
+            stiffness=None if self.stiffness is None else STIFFNESS,
+            payload=None if self.payload is None else 0.0,
+            com_shift=None if self.com_shift is None else np.zeros(3),
+            strength=None if self.motor_strength is None else np.ones(12),
+            damping=None if self.damping is None else 1.0,
+            pushes=pushes,
+            sensors=None if self.noise is None else sensors,
         )
 
     def _draw_terrain(self, random: np.random.Generator) -> Terrain | None:

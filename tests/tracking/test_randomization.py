@@ -39,7 +39,7 @@ OTHERS = {
 PARTS = [
     part.name
     for part in fields(STANDARD)
-    if part.name not in ("push_interval", *OTHERS)
+    if part.name not in ("push_interval", "nominal_share", *OTHERS)
 ]
 
 
@@ -158,6 +158,43 @@ def test_same_seed_same_episode_other_seed_another(plans):
     one, two, other = episode(1), episode(1), episode(2)
     np.testing.assert_array_equal(one, two)
     assert (one != other).any()
+
+
+def test_a_nominal_world_is_the_models_after_a_random_one_in_the_same_context(plans):
+    """Its ground has a damping of its own, which matters by some 1e-4."""
+    everything = replace(STANDARD, push=None, **OTHERS)
+
+    def end(batch):
+        batch.reset(0, np.random.default_rng(3), 0, 10)
+        for _ in range(20):
+            batch.step(np.full((1, 12), 0.3))
+        return batch.observe()[0]
+
+    def batch(randomization):
+        config = EnvironmentConfig(reset_noise=NO_NOISE, randomization=randomization)
+        return TrackingBatch(plans, config, 1)
+
+    expected = end(batch(RandomizationConfig()))
+    drawn = batch(everything)
+    assert np.abs(end(drawn) - expected).max() > 0.05
+    drawn._config.randomization.nominal_share = 1.0
+    np.testing.assert_allclose(end(drawn), expected, atol=2e-3)
+
+
+def test_a_share_of_the_worlds_is_nominal_but_for_pushes(go2):
+    config = replace(STANDARD, nominal_share=0.3)
+    random = np.random.default_rng(0)
+    domains = [config.draw(go2, random, 0.0, 10.0) for _ in range(2000)]
+    nominal = [d for d in domains if d.payload == 0]
+    assert len(nominal) == pytest.approx(600, abs=60)
+    assert all(d.pushes for d in nominal)
+    for domain in nominal:
+        assert domain.friction == 0.8
+        assert domain.latency == 0
+        assert (domain.strength == 1).all()
+        assert not domain.com_shift.any()
+        assert not domain.sensors.white.any()
+        assert not domain.sensors.bias.any()
 
 
 @pytest.mark.parametrize("name", [*PARTS, *OTHERS])
