@@ -19,8 +19,19 @@ from loco_drake.evaluation.report.results import (
     load_results,
     results_dir,
 )
-from loco_drake.evaluation.report.sections import disturbed_table
-from loco_drake.evaluation.report.tables import figure_cell, recognition_tables
+from loco_drake.evaluation.report.sections import (
+    disturbed_table,
+    generation_table,
+    policies_table,
+    realism_table,
+    robustness_table,
+    tokenizer_table,
+)
+from loco_drake.evaluation.report.tables import (
+    Table,
+    figure_cell,
+    recognition_tables,
+)
 from loco_drake.evaluation.robustness_pictures import levels_table
 from loco_drake.models.robots import ROBOTS
 
@@ -56,7 +67,7 @@ STEERING: Columns = (
 
 
 def tracking_rows(results: dict[str, Any]) -> Rows:
-    """Returns the rows of a table of docs/tracking.md."""
+    """Returns the rows of a table by gait of docs/tracking_results.md."""
     return [[name, *_cells(own, TRACKING)] for name, own in _by_label(results)]
 
 
@@ -75,8 +86,7 @@ def steering_rows(results: dict[str, Any]) -> Rows:
 
 def disturbed_rows(results: dict[str, Any]) -> Rows:
     """Returns the rows of a table by gait of docs/robustness.md."""
-    table = disturbed_table(str(results["robot"]), Figures(results))
-    return [[row.title, *(cell.text for cell in row.cells)] for row in table.rows]
+    return _texts(disturbed_table(str(results["robot"]), Figures(results)))
 
 
 def level_rows(results: dict[str, Any]) -> Rows:
@@ -86,8 +96,49 @@ def level_rows(results: dict[str, Any]) -> Rows:
 
 def table_1_rows(results: Results) -> Rows:
     """Returns the rows of Table 1 of docs/results.md."""
-    table = recognition_tables(results.of_robots("generation"))["transformer"]
-    return [[row.title, *(cell.text for cell in row.cells)] for row in table.rows]
+    return _texts(recognition_tables(results.of_robots("generation"))["transformer"])
+
+
+def world_rows(results: Results) -> Rows:
+    """Returns the rows of the table of all worlds of docs/tracking_results.md."""
+    rows = _noted(robustness_table(results))
+    return [row[:-1] for row in rows]  # without what it was measured on
+
+
+def policy_rows(results: Results) -> Rows:
+    """Returns the rows of the table of all policies of docs/tracking_results.md."""
+    return _texts(policies_table(results))
+
+
+def matched_rows(results: Results) -> Rows:
+    """Returns the rows of recognition of docs/generation_results.md."""
+    return _noted(recognition_tables(results.of_robots("generation"))["matched"])
+
+
+def realism_rows(results: Results) -> Rows:
+    """Returns the rows of what tells real from generated of the same page."""
+    rows = _noted(realism_table(results.of_robots("generation")))
+    return [[title, *texts] for title, _, *texts in rows]  # without the paper's clips
+
+
+def generation_rows(robot: str) -> Callable[[Results], Rows]:
+    """Returns what makes the rows by gait of a robot of the same page."""
+
+    def rows(results: Results) -> Rows:
+        found = results.of("generation", robot)
+        return _noted(found and generation_table(robot, found))
+
+    return rows
+
+
+def tokenizer_rows(results: Results) -> Rows:
+    """Returns the rows of the errors of the tokenizer of the model card."""
+    found = results.of_robots("tokenizer").items()
+    tables = [tokenizer_table(robot, own).rows for robot, own in found]
+    return [
+        [rows[0].title, *(cell.text for row in rows for cell in row.cells[:2])]
+        for rows in zip(*tables, strict=True)
+    ]
 
 
 def goal_rows(results: Results) -> Rows:
@@ -107,7 +158,7 @@ def goal_rows(results: Results) -> Rows:
 
 # Page, results, the line before the table, and its rows.
 _TABLES: tuple[tuple[str, str, str, Callable[[dict[str, Any]], Rows]], ...] = (
-    ("tracking.md", "tracking-{robot}-generated", "{title}:", tracking_rows),
+    ("tracking_results.md", "tracking-{robot}-generated", "{title}:", tracking_rows),
     ("steering.md", "steering-{robot}", "{title}:", steering_rows),
     (
         "robustness.md",
@@ -121,6 +172,15 @@ _TABLES: tuple[tuple[str, str, str, Callable[[dict[str, Any]], Rows]], ...] = (
 _WHOLE: tuple[tuple[str, str, Callable[[Results], Rows]], ...] = (
     ("results.md", "share of trajectories recognized:", table_1_rows),
     ("results.md", "Goals and what was measured[^\n]*:", goal_rows),
+    ("tracking_results.md", "All gaits together, by condition:", world_rows),
+    ("tracking_results.md", "Policies in the world[^\n]*:", policy_rows),
+    ("generation_results.md", "Diversity[^\n]*:", matched_rows),
+    ("generation_results.md", "Real or generated[^\n]*:", realism_rows),
+    *(
+        ("generation_results.md", f"{title}, by gait:", generation_rows(robot))
+        for robot, title in TITLES.items()
+    ),
+    ("../models/pretrained/MODEL_CARD.md", "held-out recordings:", tokenizer_rows),
 )
 
 
@@ -146,12 +206,29 @@ def _replaced(page: str, line: str, rows: Rows) -> str:
     matches = list(re.finditer(table, page, re.M))
     if len(matches) != 1:
         raise ValueError(f"{len(matches)} tables come after {line!r}, not one")
+    if not rows:
+        raise ValueError(f"there are no results for the table after {line!r}")
     match = matches[0]
     width = match[1].splitlines()[2].count("|") - 1
     if any(len(row) != width for row in rows):
         raise ValueError(f"the table after {line!r} has {width} columns")
     lines = "".join(f"| {' | '.join(row)} |\n" for row in rows)
     return f"{page[: match.start()]}{match[1]}{lines}{page[match.end() :]}"
+
+
+def _texts(table: Table | None) -> Rows:
+    """Returns the rows of a table of the report, if there is one."""
+    rows = table.rows if table else ()
+    return [[row.title, *(cell.text for cell in row.cells)] for row in rows]
+
+
+def _noted(table: Table | None) -> Rows:
+    """Returns the same with what the report shows below an entry behind it."""
+    rows = table.rows if table else ()
+    noted = [
+        [f"{c.text} ({c.note})" if c.note else c.text for c in r.cells] for r in rows
+    ]
+    return [[row.title, *texts] for row, texts in zip(rows, noted, strict=True)]
 
 
 def _by_label(results: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -91,7 +91,15 @@ def readme():
 
 
 @pytest.mark.parametrize(
-    "name", ["tracking.md", "steering.md", "robustness.md", "results.md"]
+    "name",
+    [
+        "tracking_results.md",
+        "generation_results.md",
+        "steering.md",
+        "robustness.md",
+        "results.md",
+        "../models/pretrained/MODEL_CARD.md",
+    ],
 )
 def test_pages_show_the_committed_results(name):
     page = (ROOT / "docs" / name).read_text()

@@ -19,7 +19,7 @@ class EvaluateGeneration(Effort, Evaluation):
     """Compare generated motion with recorded motion.
 
     Measures gait recognition (Table 1 of the paper), two-sample accuracy, novelty,
-    slip, penetration, jerk, speed and drift, as defined in docs/generation.md.
+    slip, penetration, jerk, speed and drift, as defined in docs/generation_method.md.
     """
 
     KEYS = (

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 class EvaluateTokenizer(Evaluation):
     """Encode and decode held-out recordings and measure the reconstruction.
 
-    Measures joint and toe errors and codebook usage, as defined in docs/generation.md.
-    The result is deterministic.
+    Measures joint and toe errors and codebook usage, as defined in
+    docs/generation_method.md. The result is deterministic.
     """
 
     KEYS = ("labels", "all", "codebook_use")

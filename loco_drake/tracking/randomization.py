@@ -60,8 +60,8 @@ BIAS = error_vector(
 class RandomizationConfig:
     """Ranges from which each episode's world is drawn; a part that is None is off.
 
-    Draws are uniform unless stated otherwise. docs/tracking.md describes the model of
-    each part and the sources of the ranges in STANDARD.
+    Draws are uniform unless stated otherwise. docs/tracking_method.md describes the
+    model of each part and the sources of the ranges in STANDARD.
     """
 
     # Coulomb friction coefficient of the ground. A contact uses the harmonic mean with
@@ -90,7 +90,8 @@ class RandomizationConfig:
     slope: Range = None
     # Height range of smooth bumps of the ground, m.
     roughness: Range = None
-    # Sensor errors, as a multiple of the standard deviations in docs/tracking.md.
+    # Sensor errors, as a multiple of the standard deviations in
+    # docs/tracking_method.md.
     noise: Multiple = None
     # Share of the worlds that are like the model but for their pushes, so that a policy
     # stays exact there.
