@@ -126,7 +126,7 @@ def generation_rows(robot: str) -> Callable[[Results], Rows]:
 
     def rows(results: Results) -> Rows:
         found = results.of("generation", robot)
-        return _noted(found and generation_table(robot, found))
+        return _noted(generation_table(robot, found) if found else None)
 
     return rows
 
