@@ -15,7 +15,7 @@ import gymnasium
 
 if TYPE_CHECKING:
     from loco_drake.common.errors import InputError as InputError
-    from loco_drake.control.actor import load_actor as load_actor
+    from loco_drake.control.actor_file import load_actor as load_actor
     from loco_drake.control.domain import Domain as Domain
     from loco_drake.control.plan import Plan as Plan
     from loco_drake.control.plan import plan_from_motion as plan_from_motion
@@ -56,7 +56,7 @@ _FROM = {
     "TrackingEnv": "tracking.environment",
     "generate": "generation.generate:generate_motion",
     "get_robot": "models.robots",
-    "load_actor": "control.actor",
+    "load_actor": "control.actor_file",
     "load_motion": "motion.motion_file",
     "plan_from_motion": "control.plan",
     "pretrained_motion_model": "generation.motion_model",

@@ -15,7 +15,8 @@ from pydrake.systems.framework import (
 )
 
 from loco_drake.control.action import joint_targets, set_points
-from loco_drake.control.actor import Actor, act
+from loco_drake.control.actor import Actor
+from loco_drake.control.actor_file import act
 from loco_drake.control.observation import OBSERVATION_SIZE, observe, preview
 from loco_drake.control.plan import PLAN_DT, Plan, standing_plan
 from loco_drake.control.reward import REWARD_TERMS, reward_terms

@@ -17,7 +17,7 @@ from pydrake.systems.framework import (
 )
 
 from loco_drake.common.errors import InputError
-from loco_drake.control.actor import load_actor
+from loco_drake.control.actor_file import load_actor
 from loco_drake.control.gait_choice import best_gait
 from loco_drake.control.plan import plan_from_motion
 from loco_drake.control.retiming import fall_limit

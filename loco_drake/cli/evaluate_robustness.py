@@ -40,7 +40,7 @@ class EvaluateRobustness(SimulatedEvaluation):
 
     def prepare(self, name: str) -> "tuple[Scenario, list[Course]]":
         """Returns what to simulate for a robot."""
-        from loco_drake.control.actor import load_actor
+        from loco_drake.control.actor_file import load_actor
         from loco_drake.evaluation.disturbances import DURATION, KINDS
         from loco_drake.evaluation.robustness_table import Course
         from loco_drake.models.robots import get_robot

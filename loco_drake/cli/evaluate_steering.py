@@ -74,7 +74,7 @@ class EvaluateSteering(SimulatedEvaluation):
 
     def prepare(self, name: str) -> "tuple[Scenario, list[Course]]":
         """Returns what to simulate for a robot."""
-        from loco_drake.control.actor import load_actor
+        from loco_drake.control.actor_file import load_actor
         from loco_drake.evaluation.steering_courses import Course
         from loco_drake.models.robots import get_robot
         from loco_drake.models.shipped import policy_path

@@ -111,7 +111,7 @@ class EvaluateTracking(SimulatedEvaluation):
 
     def prepare(self, name: str) -> "tuple[Scenario, list[Trial]]":
         """Returns what to simulate for a robot."""
-        from loco_drake.control.actor import load_actor
+        from loco_drake.control.actor_file import load_actor
         from loco_drake.control.retiming import fall_limit
         from loco_drake.datasets.registry import data_dir
         from loco_drake.datasets.segments import read_segments

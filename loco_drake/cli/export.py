@@ -101,7 +101,7 @@ class Export:
         check_at_least("seed", self.seed, 0)
 
     def _write_policy(self, robot: "RobotModel", out: Path) -> None:
-        from loco_drake.control.actor import load_actor
+        from loco_drake.control.actor_file import load_actor
         from loco_drake.models.shipped import policy_path
         from loco_drake.tracking.onnx_policy import export_onnx
 

@@ -47,7 +47,7 @@ class Record:
     def run(self) -> int:
         """Writes the files and prints the table; returns 0, or 1 if there are none."""
         from loco_drake.common.determinism import single_thread
-        from loco_drake.control.actor import load_actor
+        from loco_drake.control.actor_file import load_actor
         from loco_drake.models.robots import get_robot
         from loco_drake.models.shipped import policy_path
         from loco_drake.motion.motion import FPS

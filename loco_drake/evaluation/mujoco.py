@@ -7,7 +7,7 @@ import numpy as np
 
 from loco_drake.common.errors import InputError
 from loco_drake.control.action import joint_targets, set_points
-from loco_drake.control.actor import act, load_actor
+from loco_drake.control.actor_file import act, load_actor
 from loco_drake.control.observation import observe, preview
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.reward import reward_terms

@@ -4,7 +4,7 @@ They come from a training's checkpoint, or from a policy file, which also holds 
 training needs beside the policy.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,18 +15,16 @@ from loco_drake.common import run_folder
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import Checkpoint
-from loco_drake.common.weights import kind_of, load_into, load_weights
-from loco_drake.control.actor import (
-    KIND,
-    ActorConfig,
-    read_actor_config,
-    save_actor,
-    split_learner,
-)
+from loco_drake.common.weights import kind_of, load_into
+from loco_drake.control.actor import Actor, ActorConfig
+from loco_drake.control.actor_file import KIND, read_actor, save_actor
 from loco_drake.control.observation import OBSERVATION_LAYOUT
+from loco_drake.tracking.joining import joined, recovery_of
 from loco_drake.tracking.ppo import AdaptivePPO, actor_layers, export_actor
 
 NAME = "tracker"
+# Beside a checkpoint: what acts far from the plan, which the training leaves as it is.
+RECOVERY = "recovery.safetensors"
 LAYOUT = [list(part) for part in OBSERVATION_LAYOUT]
 
 
@@ -40,6 +38,8 @@ class Beginning:
     variance: Array  # of the same shape
     count: float  # number of observations behind both
     rate: float  # learning rate of the actor
+    # Acts far from the plan, with its own mean and variance; it is not trained.
+    recovery: Actor | None = None
 
     def load(self, learner: AdaptivePPO) -> None:
         """Copies everything into ``learner``.
@@ -90,6 +90,9 @@ def read_beginning(path: Path, hidden: list[int]) -> Beginning:
         with run_folder.sound(path):
             own, layout = saved.run["hidden"], saved.run["observation_layout"]
         beginning = of_checkpoint(saved)
+        beside = path.with_name(RECOVERY)
+        if beside.is_file():
+            beginning = replace(beginning, recovery=read_actor(beside)[0])
     if own != hidden:
         raise InputError(f"{path} is of networks with --hidden {own}, not {hidden}.")
     if (layout or LAYOUT) != LAYOUT:
@@ -99,9 +102,8 @@ def read_beginning(path: Path, hidden: list[int]) -> Beginning:
 
 def _of_policy(path: Path) -> tuple[Beginning, list[int], list[list[Any]]]:
     """Returns the beginning in a policy file, its widths and observation layout."""
-    tensors, header = load_weights(path, KIND)
-    config = read_actor_config(header, path)
-    actor, learner = split_learner(tensors)
+    policy, learner = read_actor(path)
+    config, actor = policy.config, policy.state_dict()
     if not learner:
         raise InputError(
             f"{path} holds a policy without its critic; start from the checkpoint of "
@@ -114,12 +116,21 @@ def _of_policy(path: Path) -> tuple[Beginning, list[int], list[list[Any]]]:
         for ours, theirs in actor_layers(len(config.hidden)).items():
             for part in ("weight", "bias"):
                 networks[f"{theirs}.{part}"] = actor[f"{ours}.{part}"]
-        beginning = Beginning(path, networks, mean, variance, count, rate)
+        recovery = recovery_of(policy)
+        beginning = Beginning(path, networks, mean, variance, count, rate, recovery)
     return beginning, config.hidden, config.observation_layout
 
 
-def save_policy(learner: AdaptivePPO, config: ActorConfig, path: Path) -> None:
-    """Writes the learner's policy, and what else :func:`read_beginning` needs."""
+def save_policy(
+    learner: AdaptivePPO,
+    config: ActorConfig,
+    path: Path,
+    recovery: Actor | None = None,
+) -> None:
+    """Writes the learner's policy, and what else :func:`read_beginning` needs.
+
+    With a recovery, its network acts far from the plan.
+    """
     of_actor = tuple(actor_layers(len(config.hidden)).values())
     beside = {
         name: value
@@ -128,4 +139,23 @@ def save_policy(learner: AdaptivePPO, config: ActorConfig, path: Path) -> None:
     }
     beside["count"] = torch.tensor(float(learner.statistics.count), dtype=torch.float64)
     beside["rate"] = torch.tensor(learner.rate, dtype=torch.float64)
-    save_actor(export_actor(learner, config), path, learner=beside)
+    actor = export_actor(learner, config)
+    if recovery is not None:
+        actor = joined(actor, recovery)
+    save_actor(actor, path, learner=beside)
+
+
+def keep_recovery(
+    folder: Path, beginning: Beginning | None, config: ActorConfig
+) -> Actor | None:
+    """Returns what acts far from the plan in a training's policy, if anything does.
+
+    It is that of the policy that the training begins with, if that is of the same robot
+    and kind, and is kept in the training's folder.
+    """
+    path = folder / RECOVERY
+    found = None if beginning is None else beginning.recovery
+    names = ("robot", "privileged", "hidden")
+    if found and all(getattr(found.config, n) == getattr(config, n) for n in names):
+        save_actor(found, path)
+    return read_actor(path)[0] if path.is_file() else None

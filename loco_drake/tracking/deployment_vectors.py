@@ -7,7 +7,8 @@ import numpy as np
 from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import quat_exp, quat_multiply, yaw_quat
 from loco_drake.control.action import joint_targets, set_points
-from loco_drake.control.actor import Actor, act
+from loco_drake.control.actor import Actor
+from loco_drake.control.actor_file import act
 from loco_drake.control.observation import LOOK_AHEAD, observe, preview
 from loco_drake.control.plan import PLAN_DT, Plan, make_plan
 from loco_drake.control.state import ORIENTATION, split, unit_base

@@ -67,10 +67,12 @@ class ReferenceSet:
 
 @dataclass(kw_only=True)
 class Stage:
-    """One training, which begins with the networks of the stage before it."""
+    """One training, which begins with the networks of an earlier one."""
 
     # Name of its folder.
     name: str
+    # Name of the stage with whose networks it begins. Default: the one before it.
+    after: str | None = None
     # Environment steps of 20 ms.
     steps: int
     # Names of the references that it trains on. Default: all.
@@ -146,6 +148,9 @@ class Recipe:
     references: dict[str, ReferenceSet] = field(default_factory=dict)
     common: Common = field(default_factory=Common)
     stages: list[Stage] = field(default_factory=list)
+    # Stage whose network acts far from the plan, while that of the last stage acts near
+    # it; null if the last one acts everywhere.
+    recovery: str | None = None
     # Null for none.
     evaluation: Evaluation | None = field(default_factory=Evaluation)
 
@@ -168,17 +173,29 @@ class Recipe:
             _check_folder_name("name of references", name)
             references.check(name)
         names = [stage.name for stage in self.stages]
+        if self.recovery is not None:
+            check_choice("stage for recovery", self.recovery, names[:-1])
         for index, stage in enumerate(self.stages):
             _check_folder_name("name of a stage", stage.name)
             if names.count(stage.name) > 1:
                 raise InputError(f"Two stages are called {quoted(stage.name)}.")
             check_bounds(f"Steps of the stage {stage.name}", stage.steps, 1)
+            if stage.after is not None:
+                what = f"stage before {stage.name}"
+                check_choice(what, stage.after, names[:index])
             for name in stage.references:
                 check_choice("references", name, self.references)
             try:
                 self.training(index).check()
             except InputError as error:
                 raise InputError(f"Stage {quoted(stage.name)}: {error}") from None
+
+    def before_stage(self, index: int) -> int | None:
+        """Returns the stage whose networks a stage begins with, None for the first."""
+        after = self.stages[index].after
+        if after is not None:
+            return [stage.name for stage in self.stages].index(after)
+        return index - 1 if index else None
 
     def references_of(self, stage: Stage) -> list[str]:
         """Returns the names of the references of a stage."""

@@ -7,7 +7,7 @@ from statistics import fmean
 from loco_drake.common.errors import InputError
 from loco_drake.common.files import read_json, write_json
 from loco_drake.common.typed import FieldError, convert
-from loco_drake.control.actor import load_actor
+from loco_drake.control.actor_file import load_actor
 from loco_drake.control.plan import Plan
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion import FPS
@@ -15,6 +15,7 @@ from loco_drake.tracking.exact_return import exact_returns
 from loco_drake.tracking.recipe import Evaluation, Recipe
 from loco_drake.tracking.references import load_references
 
+RESULT = "result"  # stands for the stage of a policy of two stages' networks
 GOAL = 90.0  # normalized return whose first time is noted
 
 
@@ -54,9 +55,14 @@ class Evaluator:
         last = self._points[-1].steps if self._points else 0
         return steps // self._evaluation.every > last // self._evaluation.every
 
-    def evaluate(self, steps: int, stage: int, policy: Path) -> None:
-        """Notes the returns of a policy after ``steps`` of all stages, once."""
-        if any(point.steps == steps for point in self._points):
+    def evaluate(self, steps: int, stage: int | None, policy: Path) -> None:
+        """Notes the returns of a policy after ``steps`` of all stages, once.
+
+        ``stage`` is the one that it comes from; None for the recipe's result of two.
+        """
+        name = RESULT if stage is None else self._recipe.stages[stage].name
+        last = len(self._recipe.stages) - 1
+        if (steps, name) in {(point.steps, point.stage) for point in self._points}:
             return
         robot = get_robot(self._recipe.robot)
         if not self._plans:
@@ -65,11 +71,11 @@ class Evaluator:
             load_actor(policy, robot),
             self._plans,
             round(self._evaluation.motions.seconds * FPS),
-            self._recipe.training(stage).environment.plant,
+            self._recipe.training(last if stage is None else stage).environment.plant,
         )
         point = Point(
             steps=steps,
-            stage=self._recipe.stages[stage].name,
+            stage=name,
             mean_return=round(fmean(returns.values()), 2),
             by_label={label: round(x, 2) for label, x in returns.items()},
         )

@@ -12,11 +12,12 @@ from loco_drake.common.determinism import single_thread
 from loco_drake.common.errors import InputError, quoted
 from loco_drake.common.files import atomic_path, read_json, write_json
 from loco_drake.common.run_folder import CHECKPOINT, locked, stop_requests
-from loco_drake.control.actor import halve_policy
+from loco_drake.control.actor_file import halve_policy
 from loco_drake.control.plan import Plan
 from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import training_path
 from loco_drake.tracking.beginning import read_beginning
+from loco_drake.tracking.joining import join_policies
 from loco_drake.tracking.learning_curve import PROGRESS, learning_curve
 from loco_drake.tracking.recipe import (
     EVALUATION,
@@ -36,6 +37,7 @@ BEFORE = "before"  # folder of the stages of another recipe
 FIGURES = "figures.json"
 _START = "start.safetensors"
 _POINTS = "evaluation.json"
+_BOTH = "both.safetensors"  # the policy in 32 bits, while it is written
 
 # Is told what is being done, how much of it is done and of how much, and a note.
 Report = Callable[[str, int, int, str], None]
@@ -86,8 +88,7 @@ def run_recipe(
         run.begin(resume=resume)
         interrupted = not (run.do_before() and run.make_references() and run.train())
         if not interrupted:
-            last = run.stage_folder(len(recipe.stages) - 1)
-            halve_policy(last / POLICY, folder / POLICY)
+            run.finish()
         curve = recipe_curve(folder, recipe)
         write_json(folder / CURVE, curve)
     return {"robot": recipe.robot, "interrupted": interrupted, **curve}
@@ -269,12 +270,30 @@ class _Run:
                 return False
         return True
 
+    def finish(self) -> None:
+        """Writes the policy."""
+        last = self.stage_folder(len(self.recipe.stages) - 1)
+        target = self.folder / POLICY
+        if self.recipe.recovery is None:
+            halve_policy(last / POLICY, target)
+            return
+        names = [stage.name for stage in self.recipe.stages]
+        far = self.stage_folder(names.index(self.recipe.recovery))
+        both = self.folder / _BOTH
+        join_policies(last / POLICY, far / POLICY, both)
+        halve_policy(both, target)
+        both.unlink()
+        if self.evaluator:
+            done = self._steps_before(len(self.recipe.stages))
+            self.evaluator.evaluate(done, None, target)
+
     def _train_stage(self, index: int, stage: Stage, plans: list[Plan]) -> bool:
         folder, first = self.stage_folder(index), None
         resume = (folder / CHECKPOINT).is_file()
-        if not resume and index > 0:
+        earlier = self.recipe.before_stage(index)
+        if not resume and earlier is not None:
             # Not its policy, which a kill may have left a batch behind.
-            first = self.stage_folder(index - 1) / CHECKPOINT
+            first = self.stage_folder(earlier) / CHECKPOINT
         elif not resume and (self.folder / _START).is_file():
             first = self.folder / _START
 
@@ -312,4 +331,5 @@ class _Run:
 def _of_stage(recipe: Recipe, index: int) -> tuple[Any, ...]:
     """Returns what a stage depends on, for comparison."""
     stage = recipe.stages[index]
-    return stage.name, recipe.references_of(stage), recipe.training(index)
+    before = recipe.before_stage(index)
+    return stage.name, before, recipe.references_of(stage), recipe.training(index)

@@ -15,13 +15,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from loco_drake.control.actor import (
-    Actor,
-    ActorConfig,
-    HistoryActor,
-    mirror_observations,
-)
+from loco_drake.control.actor import Actor, ActorConfig, mirror_observations
 from loco_drake.control.history import completed, recall
+from loco_drake.control.history_actor import HistoryActor
 from loco_drake.control.observation import PLACES
 from loco_drake.tracking.config import StudentConfig
 from loco_drake.tracking.replay import Replay
@@ -38,6 +34,8 @@ def make_student(teacher: Actor, history: int, labels: list[str]) -> HistoryActo
     changes = {"privileged": False, "history": history, "labels": labels}
     student = HistoryActor(ActorConfig(**{**asdict(teacher.config), **changes}))
     student.layers.load_state_dict(teacher.layers.state_dict())
+    if teacher.config.recovery is not None:
+        student.recovery.load_state_dict(teacher.recovery.state_dict())
     last = student.estimator[-1]
     assert isinstance(last, nn.Linear)
     nn.init.zeros_(last.weight)

@@ -19,7 +19,7 @@ from loco_drake.common.determinism import single_thread
 from loco_drake.common.device import find_device
 from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import Checkpoint, RunFolder
-from loco_drake.control.actor import ActorConfig
+from loco_drake.control.actor import Actor, ActorConfig
 from loco_drake.control.plan import Plan
 from loco_drake.engine.executor import Executor
 from loco_drake.engine.local import LOCAL
@@ -28,6 +28,7 @@ from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.tracking.beginning import (
     LAYOUT,
     NAME,
+    keep_recovery,
     of_checkpoint,
     read_beginning,
     save_policy,
@@ -105,6 +106,12 @@ def train_tracker(
         failure_weight=config.environment.failure_weight,
         half_episode=config.environment.episode_steps // 2,
     )
+    actor = ActorConfig(
+        robot=get_robot(config.environment.robot).name,
+        labels=[str(ROW_LABELS[i]) for i in sampler.present],
+        hidden=config.ppo.hidden,
+        privileged=config.ppo.privileged,
+    )
     start = time.monotonic()
     with (
         single_thread(),
@@ -145,7 +152,14 @@ def train_tracker(
             learner.set_logger(Logger(None, [writer]))
             with run_folder.stop_requests() as stop_requested:
                 saver = _Saver(
-                    held, log, sampler, config, report, stop_requested, steps_before
+                    held,
+                    log,
+                    sampler,
+                    actor,
+                    keep_recovery(Path(folder), beginning, actor),
+                    report,
+                    stop_requested,
+                    steps_before,
                 )
                 if learner.num_timesteps < config.steps:
                     learner.learn(
@@ -207,7 +221,8 @@ class _Saver(BaseCallback):
     run: RunFolder
     log: Path
     sampler: PlanSampler
-    config: TrainingConfig
+    actor: ActorConfig
+    recovery: Actor | None
     report: Report
     stop_requested: Event
     saved_steps: int
@@ -244,10 +259,4 @@ class _Saver(BaseCallback):
         """Writes the checkpoint and the policy."""
         self.run.save(*_state(learner, self.sampler))
         self.saved_steps = learner.num_timesteps
-        actor = ActorConfig(
-            robot=get_robot(self.config.environment.robot).name,
-            labels=[str(ROW_LABELS[i]) for i in self.sampler.present],
-            hidden=self.config.ppo.hidden,
-            privileged=self.config.ppo.privileged,
-        )
-        save_policy(learner, actor, self.log.parent / POLICY)
+        save_policy(learner, self.actor, self.log.parent / POLICY, self.recovery)

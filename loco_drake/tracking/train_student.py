@@ -17,7 +17,7 @@ from loco_drake.common import run_folder
 from loco_drake.common.determinism import single_thread
 from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import Checkpoint
-from loco_drake.control.actor import load_actor, save_actor
+from loco_drake.control.actor_file import load_actor, save_actor
 from loco_drake.control.plan import Plan
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import ROW_LABELS

@@ -3,7 +3,8 @@
 import pytest
 import torch
 
-from loco_drake.control.actor import Actor, ActorConfig, save_actor
+from loco_drake.control.actor import Actor, ActorConfig
+from loco_drake.control.actor_file import save_actor
 from loco_drake.motion.motion_file import save_motion
 from tests.synthetic_motion import synthetic_motion
 

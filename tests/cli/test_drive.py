@@ -10,7 +10,8 @@ import pytest
 
 from loco_drake.cli import drive_view
 from loco_drake.cli.main import main
-from loco_drake.control.actor import Actor, ActorConfig, save_actor
+from loco_drake.control.actor import Actor, ActorConfig
+from loco_drake.control.actor_file import save_actor
 from loco_drake.control.drive_file import load_drive
 from loco_drake.control.gait_choice import PAUSE, Choice, next_choice
 from loco_drake.models.robots import get_robot

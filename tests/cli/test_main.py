@@ -13,7 +13,8 @@ import torch
 from loco_drake import __version__
 from loco_drake.cli.main import _COMMANDS, main
 from loco_drake.common.weights import save_network
-from loco_drake.control.actor import Actor, ActorConfig, save_actor
+from loco_drake.control.actor import Actor, ActorConfig
+from loco_drake.control.actor_file import save_actor
 from loco_drake.models.shipped import pretrained_path
 from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion_file import save_motion

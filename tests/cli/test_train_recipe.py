@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from loco_drake.cli.main import main
-from loco_drake.control.actor import load_actor
+from loco_drake.control.actor_file import load_actor
 from loco_drake.models.robots import get_robot
 
 TEXT = """

@@ -4,7 +4,7 @@ import pytest
 
 from loco_drake.cli.main import main
 from loco_drake.common.run_folder import read_checkpoint
-from loco_drake.control.actor import load_actor
+from loco_drake.control.actor_file import load_actor
 from loco_drake.models.robots import get_robot
 from loco_drake.tracking.randomization import STANDARD
 

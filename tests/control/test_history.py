@@ -7,15 +7,8 @@ import pytest
 import torch
 
 from loco_drake.common.errors import InputError
-from loco_drake.control.actor import (
-    ActorConfig,
-    HistoryActor,
-    act,
-    load_actor,
-    mirror_actions,
-    mirror_observations,
-    save_actor,
-)
+from loco_drake.control.actor import ActorConfig, mirror_actions, mirror_observations
+from loco_drake.control.actor_file import act, load_actor, save_actor
 from loco_drake.control.history import (
     FRAME,
     FRAME_SIZE,
@@ -25,6 +18,7 @@ from loco_drake.control.history import (
     recall,
     remember,
 )
+from loco_drake.control.history_actor import HistoryActor
 from loco_drake.control.observation import OBSERVATION_SIZE, PLACES, observe, preview
 from loco_drake.control.plan import plan_from_motion
 from loco_drake.control.state import POSITION, VELOCITY, split

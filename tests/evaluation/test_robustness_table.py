@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 import torch
 
-from loco_drake.control.actor import Actor, ActorConfig, save_actor
+from loco_drake.control.actor import Actor, ActorConfig
+from loco_drake.control.actor_file import save_actor
 from loco_drake.evaluation.disturbances import DURATION, Disturbance
 from loco_drake.evaluation.robustness_table import (
     Course,

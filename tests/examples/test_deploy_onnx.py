@@ -9,7 +9,8 @@ import onnx
 import pytest
 from pydrake.common.value import Value
 
-from loco_drake.control.actor import Actor, ActorConfig, act, make_actor
+from loco_drake.control.actor import Actor, ActorConfig
+from loco_drake.control.actor_file import act, make_actor
 from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.control.plan import PLAN_DT, make_plan
 from loco_drake.control.plan_file import save_plan

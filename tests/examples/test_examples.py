@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from loco_drake.cli.main import main
-from loco_drake.control.actor import load_actor
+from loco_drake.control.actor_file import load_actor
 from loco_drake.evaluation.tracking import joint_rmse
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import load_motion

@@ -7,7 +7,8 @@ import torch
 from pydrake.systems.analysis import Simulator
 
 from loco_drake.common.errors import InputError
-from loco_drake.control.actor import Actor, ActorConfig, load_actor, save_actor
+from loco_drake.control.actor import Actor, ActorConfig
+from loco_drake.control.actor_file import load_actor, save_actor
 from loco_drake.control.plan import first_change
 from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import policy_path, policy_variants, pretrained_dir

@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from loco_drake.cli.main import main
-from loco_drake.control.actor import load_actor
+from loco_drake.control.actor_file import load_actor
 from loco_drake.control.plan import plan_from_motion
 from loco_drake.control.state import has_fallen, split
 from loco_drake.generation import features as ft

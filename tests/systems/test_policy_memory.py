@@ -4,13 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.control.actor import (
-    ActorConfig,
-    HistoryActor,
-    act,
-    load_actor,
-    save_actor,
-)
+from loco_drake.control.actor import ActorConfig
+from loco_drake.control.actor_file import act, load_actor, save_actor
+from loco_drake.control.history_actor import HistoryActor
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.diagram import MakeLocomotionDiagram

@@ -9,12 +9,10 @@ from loco_drake.common.weights import load_weights, save_weights
 from loco_drake.control.actor import (
     Actor,
     ActorConfig,
-    halve_policy,
-    load_actor,
     mirror_actions,
     mirror_observations,
-    save_actor,
 )
+from loco_drake.control.actor_file import halve_policy, load_actor, save_actor
 from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.control import TrackingPolicy

@@ -12,7 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
 
 from loco_drake.control.actor import PRIVILEGED, ActorConfig
-from loco_drake.control.actor import make_actor as make_network
+from loco_drake.control.actor_file import make_actor as make_network
 from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
 from loco_drake.models.robots import ROBOTS, get_robot
 from loco_drake.motion.gaits import GAITS, SOURCES, any_label

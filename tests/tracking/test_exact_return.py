@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from loco_drake.control.actor import Actor, load_actor
+from loco_drake.control.actor import Actor
+from loco_drake.control.actor_file import load_actor
 from loco_drake.control.state import TerminationConfig
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot

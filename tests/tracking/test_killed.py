@@ -11,7 +11,7 @@ from contextlib import suppress
 import pytest
 
 from loco_drake.common.run_folder import read_checkpoint
-from loco_drake.control.actor import load_actor
+from loco_drake.control.actor_file import load_actor
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import save_motion
 from tests.process import LIMIT, processes

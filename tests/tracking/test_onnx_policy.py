@@ -8,13 +8,8 @@ import pytest
 import torch
 
 from loco_drake.cli.main import main
-from loco_drake.control.actor import (
-    Actor,
-    ActorConfig,
-    load_actor,
-    make_actor,
-    save_actor,
-)
+from loco_drake.control.actor import Actor, ActorConfig
+from loco_drake.control.actor_file import load_actor, make_actor, save_actor
 from loco_drake.control.observation import OBSERVATION_LAYOUT, OBSERVATION_SIZE
 from loco_drake.models.robots import get_robot
 from loco_drake.tracking.onnx_policy import export_onnx, policy_metadata

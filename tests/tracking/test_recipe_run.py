@@ -1,6 +1,7 @@
 """Trainings by a recipe: interrupted anywhere, they end as if they had not been."""
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,11 +13,13 @@ import torch
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import locked, read_checkpoint
-from loco_drake.control.actor import load_actor
+from loco_drake.control.actor_file import load_actor
+from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import load_motion
 from loco_drake.tracking.exact_return import exact_returns
+from loco_drake.tracking.joining import recovery_of
 from loco_drake.tracking.recipe import (
     Before,
     Evaluation,
@@ -180,6 +183,55 @@ def test_policies_are_evaluated_on_the_way_and_after_each_stage(ended, recipe):
     assert points[-1]["by_label"] == {"dog-trot": round(returns["dog-trot"], 2)}
     assert points[-1]["mean_return"] == points[-1]["by_label"]["dog-trot"]
     assert figures["steps_to_90"] is None
+
+
+def test_two_stages_can_come_after_one_and_their_networks_act_together(
+    ended, recipe, tmp_path
+):
+    second = recipe.stages[1]
+    third = Stage(name="third", after="first", steps=64)
+    two = replace(recipe, stages=[recipe.stages[0], second, third], recovery="second")
+    folder = tmp_path / "run"
+    shutil.copytree(ended[0], folder)
+    for name in (POLICY, "curve.json"):
+        (folder / name).unlink()
+    figures = run_recipe(folder, two, resume=True)
+    assert read_recipe(folder / "recipe.yaml") == two
+    assert figures["steps"] == 192 + 128 + 64
+    last, result = figures["evaluation"][-2:]
+    assert (last["stage"], last["steps"]) == ("third", 384)
+    assert (result["stage"], result["steps"]) == ("result", 384)
+    networks = [
+        read_checkpoint(folder / stage / CHECKPOINT, "tracker").tensors
+        for stage in ("1-first", "2-second", "3-third")
+    ]
+    name = "module/mlp_extractor.policy_net.0.weight"
+    first, other, own = (tensors[name] for tensors in networks)
+    assert (own - first).abs().max() < (own - other).abs().max()
+    go2 = get_robot("go2")
+    policy = load_actor(folder / POLICY, go2)
+    assert not list(folder.glob("both*"))
+    alone = load_actor(folder / "2-second" / POLICY, go2)
+    seen = alone.mean + 0.3 * alone.variance.sqrt() * torch.randn(8, OBSERVATION_SIZE)
+    with torch.inference_mode():
+        far, kept = alone(seen), recovery_of(policy)(seen)
+    torch.testing.assert_close(kept, far, rtol=2e-2, atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"recovery": "second"}, "Unknown stage for recovery 'second'"),
+        ({"recovery": "none"}, "the choices are first"),
+        ({"after": "second"}, "Unknown stage before second 'second'"),
+    ],
+)
+def test_stages_that_are_named_must_be_there_before(recipe, change, message):
+    second = replace(recipe.stages[1], after=change.get("after"))
+    stages = [recipe.stages[0], second]
+    wrong = replace(recipe, stages=stages, recovery=change.get("recovery"))
+    with pytest.raises(InputError, match=message):
+        wrong.check()
 
 
 def test_the_steps_to_a_return_of_90_are_those_of_its_first_time(ended, tmp_path):

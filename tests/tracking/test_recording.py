@@ -9,7 +9,7 @@ import tyro
 
 from loco_drake.cli.record import Record
 from loco_drake.common.errors import InputError
-from loco_drake.control.actor import load_actor
+from loco_drake.control.actor_file import load_actor
 from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import policy_path
 from loco_drake.motion import quality

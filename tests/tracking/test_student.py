@@ -9,9 +9,11 @@ import torch
 
 from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import read_checkpoint
-from loco_drake.control.actor import HistoryActor, load_actor, mirror_actions
+from loco_drake.control.actor import mirror_actions
 from loco_drake.control.actor import mirror_observations as mirror
+from loco_drake.control.actor_file import load_actor
 from loco_drake.control.history import remember
+from loco_drake.control.history_actor import HistoryActor
 from loco_drake.control.observation import OBSERVATION_SIZE, PLACES
 from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import pretrained_path

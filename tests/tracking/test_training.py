@@ -1,5 +1,6 @@
 import json
 import signal
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,17 +9,13 @@ import torch
 from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import read_checkpoint
 from loco_drake.common.weights import load_weights, save_weights
-from loco_drake.control.actor import (
-    halve_policy,
-    load_actor,
-    mirror_actions,
-    mirror_observations,
-    save_actor,
-)
+from loco_drake.control.actor import mirror_actions, mirror_observations
+from loco_drake.control.actor_file import halve_policy, load_actor, save_actor
 from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import parse_label
 from loco_drake.tracking.config import EnvironmentConfig, PpoConfig, TrainingConfig
+from loco_drake.tracking.joining import join_policies, recovery_of
 from loco_drake.tracking.ppo import make_ppo
 from loco_drake.tracking.randomization import STANDARD
 from loco_drake.tracking.sampler import PlanSampler
@@ -192,6 +189,36 @@ def test_a_policy_in_half_precision_can_be_started_from(trained, plans, tmp_path
     assert half.stat().st_size < 0.7 * whole.stat().st_size
 
 
+def test_what_acts_far_from_the_plan_stays_as_it_is(trained, plans, tmp_path):
+    """Also when the training is resumed, or another one starts from its checkpoint."""
+    near, far = trained[0] / "policy.safetensors", tmp_path / "far.safetensors"
+    go2 = get_robot("go2")
+    other = load_actor(near, go2)
+    for parameter in other.parameters():
+        parameter.data.mul_(1.1)
+    save_actor(other, far)
+    join_policies(near, far, tmp_path / "both.safetensors")
+    first, run = tmp_path / "both.safetensors", tmp_path / "run"
+    train_tracker(plans, config(64), run, first=first)
+    train_tracker(plans, config(128), run, resume=True)
+    again = tmp_path / "again"
+    train_tracker(plans, config(0), again, first=run / "checkpoint.safetensors")
+    # What is far from all that was seen is cut off, by the statistics of each.
+    seen = other.mean + 0.3 * other.variance.sqrt() * torch.randn(8, OBSERVATION_SIZE)
+    with torch.inference_mode():
+        for folder in (run, again):
+            policy = load_actor(folder / "policy.safetensors", go2)
+            kept = recovery_of(policy)
+            torch.testing.assert_close(kept(seen), other(seen), rtol=1e-3, atol=1e-4)
+        moved = (policy.layers[0].weight - other.layers[0].weight / 1.1).abs().max()
+        assert 0 < moved < 0.02
+    # An actor that observes less cannot use it.
+    blind = replace(config(0), ppo=replace(config(0).ppo, privileged=False))
+    train_tracker(plans, blind, tmp_path / "blind", first=first)
+    policy = load_actor(tmp_path / "blind" / "policy.safetensors", go2)
+    assert policy.config.recovery is None
+
+
 def test_a_policy_without_its_critic_is_refused(trained, plans, tmp_path):
     """As they were written before, or by save_actor."""
     actor = load_actor(trained[0] / "policy.safetensors", get_robot("go2"))
@@ -269,7 +296,7 @@ def test_a_reward_for_entropy_keeps_noise_up(plans, tmp_path):
 
 def test_failures_of_starts_are_resumed(plans, tmp_path):
     """Thrown about by noise, episodes fail; a resumed run knows where."""
-    other = config(64, log_std=1.0)
+    other = config(128, log_std=2.0)
     other.environment.failure_weight = 0.5
     train_tracker(plans, other, tmp_path)
     rates = saved_in(tmp_path).tensors["sampler/failure_rates"]

@@ -17,7 +17,7 @@ from pydrake.geometry import Meshcat
 
 from loco_drake import __version__
 from loco_drake.common.errors import InputError, check_choice
-from loco_drake.control.actor import load_actor
+from loco_drake.control.actor_file import load_actor
 from loco_drake.evaluation.library import read_library
 from loco_drake.evaluation.report import pictures
 from loco_drake.evaluation.report.content import CONTENT

@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 from itertools import product
 from typing import Any
 
-from loco_drake.control.actor import load_actor
+from loco_drake.control.actor_file import load_actor
 from loco_drake.evaluation.report.content import CONTENT
 from loco_drake.evaluation.report.results import Figures, Results, tracking_name
 from loco_drake.evaluation.report.tables import (
