@@ -64,7 +64,7 @@ def test_a_robot_on_its_plan_is_off_by_nothing_and_one_beside_it_is(go2):
     time = plan.start_time + 5 * PLAN_DT
     state = np.concatenate((plan.q[5], plan.v[5]))
     shares = []
-    for aside in (0.0, 0.2):
+    for aside in (0.0, 0.5):
         state[5] += aside
         seen = observe(go2, preview(plan, time), state, np.zeros(12))
         shares.append(share_of_recovery(torch.tensor(seen), RECOVERY).item())
@@ -75,7 +75,7 @@ def test_one_network_acts_near_the_plan_and_the_other_far_from_it():
     near, far = actor(0), actor(1)
     both = joined(near, far)
     with torch.inference_mode():
-        for off in ({}, {"v": (1.0, 0.0)}, {"p": (0.08, 0.04)}):
+        for off in ({}, {"v": (1.0, 0.0)}, {"p": (0.3, 0.15)}):
             seen = at(**off)
             share = share_of_recovery(seen, RECOVERY).item()
             expected = (1 - share) * near(seen) + share * far(seen)
