@@ -12,7 +12,7 @@ from loco_drake.control.plan import PLAN_DT
 
 # At which velocity (m/s) and distance (m) in the plane, and at which angle (rad), the
 # second network begins to act.
-RECOVERY = [0.2, 0.3, 0.25]
+RECOVERY = [0.25, 0.12, 0.25]
 _V_WB_H, _W_WB_B = PLACES["v_WB_H"], PLACES["w_WB_B"]
 # Of the plan's next sample.
 _V, _P, _R = (PLACES[f"plan_{name}"].start for name in ("v_H", "p_H", "R_B"))

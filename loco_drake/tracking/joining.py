@@ -36,8 +36,9 @@ def joined(near: Actor, far: Actor, recovery: list[float] | None = None) -> Acto
         raise ValueError("networks of other widths")
     with torch.no_grad():
         deviation = torch.sqrt(far.variance + 1e-8)
-        first.bias += first.weight @ ((near.mean - far.mean) / deviation)
-        first.weight *= torch.sqrt(near.variance + 1e-8) / deviation
+        shift = first.weight @ ((near.mean - far.mean) / deviation)
+        first.bias.add_(shift)
+        first.weight.mul_(torch.sqrt(near.variance + 1e-8) / deviation)
         actor.layers.load_state_dict(near.layers.state_dict())
         actor.recovery.load_state_dict(layers.state_dict())
         actor.mean.copy_(near.mean)

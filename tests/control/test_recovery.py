@@ -75,7 +75,7 @@ def test_one_network_acts_near_the_plan_and_the_other_far_from_it():
     near, far = actor(0), actor(1)
     both = joined(near, far)
     with torch.inference_mode():
-        for off in ({}, {"v": (1.0, 0.0)}, {"p": (0.3, 0.15)}):
+        for off in ({}, {"v": (1.0, 0.0)}, {"p": (0.12, 0.06)}):
             seen = at(**off)
             share = share_of_recovery(seen, RECOVERY).item()
             expected = (1 - share) * near(seen) + share * far(seen)
