@@ -46,15 +46,14 @@ def joined(near: Actor, far: Actor, recovery: list[float] | None = None) -> Acto
     return actor.eval()
 
 
+def near_of(actor: Actor) -> Actor:
+    """Returns the network that acts near the plan, by itself."""
+    return _alone(actor, actor.layers)
+
+
 def recovery_of(actor: Actor) -> Actor | None:
     """Returns the network that acts far from the plan, by itself, if there is one."""
-    if actor.config.recovery is None:
-        return None
-    alone = make_actor(replace(actor.config, recovery=None))
-    alone.layers.load_state_dict(actor.recovery.state_dict())
-    alone.mean.copy_(actor.mean)
-    alone.variance.copy_(actor.variance)
-    return alone.eval()
+    return _alone(actor, actor.recovery) if actor.config.recovery else None
 
 
 def join_policies(near: Path, far: Path, target: Path) -> None:
@@ -68,3 +67,12 @@ def join_policies(near: Path, far: Path, target: Path) -> None:
     if configs[0] != configs[1] or configs[0].recovery or configs[0].history:
         raise InputError(f"The policies in {near} and {far} do not fit each other.")
     save_actor(joined(one, other), target, learner=learner)
+
+
+def _alone(actor: Actor, layers: torch.nn.Module) -> Actor:
+    """Returns a policy of one of a policy's networks."""
+    alone = make_actor(replace(actor.config, recovery=None))
+    alone.layers.load_state_dict(layers.state_dict())
+    alone.mean.copy_(actor.mean)
+    alone.variance.copy_(actor.variance)
+    return alone.eval()

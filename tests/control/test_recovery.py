@@ -16,7 +16,7 @@ from loco_drake.control.observation import OBSERVATION_SIZE, PLACES, observe, pr
 from loco_drake.control.plan import PLAN_DT, plan_from_motion
 from loco_drake.control.recovery import RECOVERY, share_of_recovery
 from loco_drake.models.robots import get_robot
-from loco_drake.tracking.joining import join_policies, joined, recovery_of
+from loco_drake.tracking.joining import join_policies, joined, near_of, recovery_of
 from tests.synthetic_motion import synthetic_motion
 
 
@@ -108,6 +108,7 @@ def test_files_are_joined_and_parted_again(tmp_path):
     loaded = load_actor(tmp_path / "both", get_robot("go2"))
     with torch.inference_mode():
         assert torch.equal(loaded(seen), joined(actor(0), actor(1))(seen))
+        assert torch.equal(near_of(loaded)(seen), actor(0)(seen))
         alone = recovery_of(loaded)(0.1 * seen)
         torch.testing.assert_close(alone, actor(1)(0.1 * seen), rtol=1e-4, atol=1e-5)
     assert recovery_of(actor(0)) is None
