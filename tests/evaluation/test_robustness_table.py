@@ -88,14 +88,18 @@ def test_undisturbed_it_is_what_evaluate_tracking_simulates():
 
 
 def test_a_robot_whose_policy_sleeps_scores_badly(tmp_path):
-    actor = Actor(ActorConfig(robot="go2", labels=["horse-walk"]))
+    """Feed-forward alone walks; it does not gallop."""
+    gait = "dog-gallop"
+    actor = Actor(ActorConfig(robot="go2", labels=[gait]))
     with torch.no_grad():
         for weights in actor.parameters():
             weights.zero_()
     save_actor(actor, tmp_path / "asleep.safetensors")
     policy = TrainedPolicy(weights=tmp_path / "asleep.safetensors")
-    asleep = replace(SCENARIO, policy=policy)
-    whole = summarize([COURSE], run_courses(asleep, [COURSE]))["all"]
+    reference = GeneratedReference(gait=gait, duration=DURATION)
+    asleep = Scenario(reference=reference, policy=policy)
+    course = replace(COURSE, label=gait)
+    whole = summarize([course], run_courses(asleep, [course]))["all"]
     assert whole["success"]["undisturbed"] == 0.0
     assert whole["success"]["latency"] == 0.0
     assert whole["undisturbed_return"] < 60
