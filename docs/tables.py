@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from loco_drake.common.files import atomic_path, read_json
+from loco_drake.evaluation.report.figures import Figures
 from loco_drake.evaluation.report.goals import MISSED, UNKNOWN, scoreboard
 from loco_drake.evaluation.report.results import (
-    Figures,
     Results,
     load_results,
     results_dir,

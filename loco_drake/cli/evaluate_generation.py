@@ -111,7 +111,7 @@ class EvaluateGeneration(Effort, Evaluation):
     def show(self, name: str, figures: dict[str, Any]) -> int:
         """Prints accuracies, figures by label, and all else; returns 0."""
         from loco_drake.evaluation.report import sections, tables
-        from loco_drake.evaluation.report.results import Figures
+        from loco_drake.evaluation.report.figures import Figures
 
         if figures["classifiers"] is None:
             print_failed([(name, str(figures["reason"]))])

@@ -101,7 +101,7 @@ class EvaluateRetargeting(Evaluation):
         """Writes a picture of a robot's library; with the last robot those of all."""
         from loco_drake.evaluation.dataset_picture import library_figure
         from loco_drake.evaluation.library import read_library
-        from loco_drake.evaluation.report.results import Figures
+        from loco_drake.evaluation.report.figures import Figures
         from loco_drake.models.robots import load_robot
 
         if self.figures is None:

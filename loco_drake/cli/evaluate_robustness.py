@@ -91,7 +91,7 @@ class EvaluateRobustness(SimulatedEvaluation):
 
     def draw(self, name: str, figures: dict[str, Any]) -> None:
         """Writes a picture of the curves, if it is wanted."""
-        from loco_drake.evaluation.report.results import Figures
+        from loco_drake.evaluation.report.figures import Figures
         from loco_drake.evaluation.robustness_pictures import curves_figure
 
         if self.figures is not None:

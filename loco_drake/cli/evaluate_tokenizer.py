@@ -74,7 +74,7 @@ class EvaluateTokenizer(Evaluation):
 
     def show(self, name: str, figures: dict[str, Any]) -> int:
         """Prints a table of all labels; returns 0."""
-        from loco_drake.evaluation.report.results import Figures
+        from loco_drake.evaluation.report.figures import Figures
         from loco_drake.evaluation.report.sections import tokenizer_table
 
         if figures["labels"] is None:

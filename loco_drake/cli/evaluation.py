@@ -182,7 +182,7 @@ def print_by_label(
 ) -> None:
     """Prints figures by label, in columns of the ``kinds`` in the report's content."""
     from loco_drake.evaluation.report.content import CONTENT
-    from loco_drake.evaluation.report.results import Figures
+    from loco_drake.evaluation.report.figures import Figures
     from loco_drake.evaluation.report.tables import figures_table
 
     found = {name: Figures(dict(figures)) for name, figures in rows.items()}

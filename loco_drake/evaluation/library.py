@@ -13,7 +13,7 @@ from sklearn.preprocessing import StandardScaler
 
 from loco_drake.common.arrays import Array
 from loco_drake.datasets.split import TRAIN, VALIDATION
-from loco_drake.evaluation.report.results import Figures
+from loco_drake.evaluation.report.figures import Figures
 from loco_drake.generation.features import SIZE, motion_features
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gait_timing import gait_timing, motion_track

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from loco_drake.evaluation.confidence import wilson
 from loco_drake.evaluation.disturbances import KINDS, Kind
-from loco_drake.evaluation.report.results import Figures
+from loco_drake.evaluation.report.figures import Figures
 from loco_drake.evaluation.robustness import SHARE
 
 # Told apart by the colour-blind.

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from loco_drake.common.arrays import Array, Bools
 from loco_drake.control.command import AXES
-from loco_drake.evaluation.report.results import Figures
+from loco_drake.evaluation.report.figures import Figures
 from loco_drake.evaluation.steering_courses import VELOCITY_GOAL, YAW_RATE_GOAL
 from loco_drake.motion.gaits import LABELS
 

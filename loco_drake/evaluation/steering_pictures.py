@@ -11,7 +11,7 @@ from loco_drake.common.arrays import Array
 from loco_drake.control.command import CommandRange
 from loco_drake.control.ground_path import ground_pose, integrate
 from loco_drake.control.plan import PLAN_DT
-from loco_drake.evaluation.report.results import Figures
+from loco_drake.evaluation.report.figures import Figures
 from loco_drake.evaluation.steering import stride_velocity
 from loco_drake.evaluation.steering_grid import draw_grid, grid_errors
 from loco_drake.evaluation.tracking import Recorder

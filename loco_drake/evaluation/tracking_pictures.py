@@ -15,7 +15,7 @@ from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.state import HEIGHT, JOINTS, split
 from loco_drake.evaluation.dataset_picture import COLORS
 from loco_drake.evaluation.report.content import CONTENT
-from loco_drake.evaluation.report.results import Figures
+from loco_drake.evaluation.report.figures import Figures
 from loco_drake.evaluation.report.tables import robot_title
 from loco_drake.evaluation.tracking import Recorder, Rollout, forward_speeds
 from loco_drake.motion.gaits import LABELS, SOURCES

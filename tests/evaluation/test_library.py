@@ -14,7 +14,7 @@ from loco_drake.evaluation.library import (
     principal_components,
     read_library,
 )
-from loco_drake.evaluation.report.results import Figures
+from loco_drake.evaluation.report.figures import Figures
 from loco_drake.motion.gaits import LABELS
 from tests.synthetic_motion import synthetic_motion
 

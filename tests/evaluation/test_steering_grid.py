@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from loco_drake.common.errors import InputError
 from loco_drake.control.command import CommandRange
-from loco_drake.evaluation.report.results import Figures
+from loco_drake.evaluation.report.figures import Figures
 from loco_drake.evaluation.steering_courses import grid
 from loco_drake.evaluation.steering_grid import COLUMNS, draw_grid, grid_errors
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from loco_drake.common.errors import InputError
-from loco_drake.evaluation.report.results import Figures
+from loco_drake.evaluation.report.figures import Figures
 from loco_drake.evaluation.tracking import Rollout
 from loco_drake.evaluation.tracking_pictures import learning_figure, traces_figure
 

@@ -18,6 +18,7 @@ class Figure:
     file: str = ""
     path: str = ""
     factor: float = 1.0
+    over: str = ""  # the file whose figure at this path it is divided by, if any
 
 
 @dataclass

@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from loco_drake.evaluation.report.content import CONTENT, Figure, Goal
-from loco_drake.evaluation.report.results import Figures, Results
+from loco_drake.evaluation.report.figures import Figures
+from loco_drake.evaluation.report.results import Results
 from loco_drake.models.robots import ROBOTS
 from loco_drake.motion.gaits import LABELS
 
@@ -96,21 +97,39 @@ def _read(
     figure: Figure, results: Results, robot: str, *, highest: bool = False
 ) -> Measured | None:
     """Returns the figure; ``*`` in a key stands for the worst label."""
+    found = _found(figure, results, robot)
+    if figure.over:
+        whole = _found(replace(figure, file=figure.over, factor=1.0), results, robot)
+        found = {
+            name: Measured(own.value / whole[name].value)
+            for name, own in found.items()
+            if name in whole and whole[name].value > 0
+        }
+    ordered = sorted(found, key=lambda name: (found[name].value, name))
+    if not ordered:
+        return None
+    name = ordered[-1 if highest else 0]
+    return replace(found[name], notes=(name,)) if name else found[name]
+
+
+def _found(figure: Figure, results: Results, robot: str) -> dict[str, Measured]:
+    """Returns the figures of all labels for ``*`` in the path, else one called ""."""
     within = results.of(figure.file, robot)
     if within is None:
-        return None
+        return {}
     *path, last = figure.path.split(".")
     if "*" in path:
-        pick = max if highest else min
-        found = within.extreme(pick, last, *path[: path.index("*")])
-        return found and Measured(figure.factor * found[0], notes=(found[1],))
+        parts = within.parts(*path[: path.index("*")])
+        read = {n: read_measured(part, last, figure.factor) for n, part in parts}
+        return {name: own for name, own in read.items() if own is not None}
     for key in path:
         # A gait that was not evaluated is no damage.
         otherwise = None if key in _LABELS else ""
         if within.values.get(key, otherwise) is None:
-            return None
+            return {}
         within = within.part(key)
-    return read_measured(within, last, figure.factor)
+    own = read_measured(within, last, figure.factor)
+    return {} if own is None else {"": own}
 
 
 def read_measured(figures: Figures, key: str, factor: float) -> Measured | None:

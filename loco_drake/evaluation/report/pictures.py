@@ -17,7 +17,7 @@ from loco_drake.evaluation.generation_pictures import (
     draw_strip,
 )
 from loco_drake.evaluation.library import Library
-from loco_drake.evaluation.report.results import Figures
+from loco_drake.evaluation.report.figures import Figures
 from loco_drake.evaluation.report.tables import robot_title
 from loco_drake.evaluation.robustness_pictures import curves_figure
 from loco_drake.evaluation.steering_grid import draw_grid, grid_errors

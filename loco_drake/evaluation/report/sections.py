@@ -7,7 +7,8 @@ from typing import Any
 
 from loco_drake.control.actor_file import load_actor
 from loco_drake.evaluation.report.content import CONTENT
-from loco_drake.evaluation.report.results import Figures, Results, tracking_name
+from loco_drake.evaluation.report.figures import Figures
+from loco_drake.evaluation.report.results import Results, tracking_name
 from loco_drake.evaluation.report.tables import (
     NOTHING,
     Cell,

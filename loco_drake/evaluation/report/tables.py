@@ -4,8 +4,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 
 from loco_drake.evaluation.report.content import CONTENT, Column
+from loco_drake.evaluation.report.figures import Figures
 from loco_drake.evaluation.report.goals import Measured, read_measured
-from loco_drake.evaluation.report.results import Figures
 from loco_drake.motion.gaits import LABELS
 
 NOTHING = "–"

@@ -14,9 +14,11 @@ from tests.report_results import tokenizer, tracking, write_results
 def test_options_follow_the_conditions(tmp_path):
     lagged = {**tracking("a1"), "contact": "lagged", "time_step_s": 0.002}
     recorded = {**tracking(), "reference": "retargeted", "duration_s": 4.0}
+    elsewhere = {"simulator": "mujoco", "contact": "elliptic", "time_step_s": 0.002}
     write_results(
         tmp_path,
         tracking_go2_generated=tracking(episodes=7),
+        tracking_go2_mujoco={**tracking(), **elsewhere},
         tracking_go2_retargeted=recorded,
         tracking_a1_lagged=lagged,
         tracking_a1_pushes=tracking("a1"),
@@ -25,6 +27,9 @@ def test_options_follow_the_conditions(tmp_path):
     found = commands(load_results(tmp_path))
     start = "loco-drake evaluate tracking --robot"
     assert found["tracking-go2-generated.json"] == f"{start} go2 --seeds 7"
+    assert found["tracking-go2-mujoco.json"] == (
+        f"{start} go2 --simulator mujoco --seeds 20"
+    )
     assert found["tracking-go2-retargeted.json"] == (
         f"{start} go2 --reference retargeted --duration 4 --seeds 20"
     )

@@ -72,6 +72,22 @@ def test_tracking_in_the_units_of_the_goals(tmp_path, title, text, verdict):
     assert score(tmp_path, title)[::2] == (text, verdict)
 
 
+def test_a_share_is_of_the_return_as_trained(tmp_path):
+    """70.84 of 77; of the gaits' 60 and 94 are kept 57 and 84.6."""
+    write_results(tmp_path, tracking_go2_lagged=tracking())
+    title = "lagged, 1 ms, share of"
+    assert score(tmp_path, title)[::2] == ("–", UNKNOWN)
+    lagged = tracking(normalized_return=70.84)
+    for part, value in zip(lagged["labels"].values(), (57.0, 84.6), strict=True):
+        part["normalized_return"] = value
+    write_results(
+        tmp_path, tracking_go2_generated=tracking(), tracking_go2_lagged=lagged
+    )
+    assert score(tmp_path, title) == ("92", "", MISSED)
+    last = list(lagged["labels"])[-1]
+    assert score(tmp_path, "lagged, 1 ms, share that") == ("90", last, MET)
+
+
 def test_scores_come_with_their_price(tmp_path):
     write_results(tmp_path, tracking_go2_generated=tracking())
     assert score(tmp_path, "normalized return, mean")[1] == "at stretch 1.021"

@@ -6,7 +6,7 @@ import pytest
 
 from loco_drake.common.errors import InputError
 from loco_drake.evaluation.report.content import Column
-from loco_drake.evaluation.report.results import Figures
+from loco_drake.evaluation.report.figures import Figures
 from loco_drake.evaluation.report.sections import (
     generation_table,
     steering_range_table,
