@@ -11,8 +11,8 @@ from loco_drake.systems.scenario import GeneratedReference, Scenario, SteeringCo
 
 @pytest.mark.slow
 def test_a_generator_that_is_told_a_turn_leaves_less_of_it_to_bend():
-    """The Go2's pace at .6 m/s and .7 rad/s: one point, since the range is one."""
-    turn = CommandRange((0.6, 0.0, 0.7), (0.6, 0.0, 0.7))
+    """The Go2's pace at .6 m/s and .6 rad/s: one point, since the range is one."""
+    turn = CommandRange((0.6, 0.0, 0.6), (0.6, 0.0, 0.6))
     scenario = Scenario(
         reference=GeneratedReference(gait="dog-pace", duration=60.0),
         steering=SteeringConfig(measured_ranges=False),
@@ -22,7 +22,7 @@ def test_a_generator_that_is_told_a_turn_leaves_less_of_it_to_bend():
     assert set(figures) == {"range", "points", *WAYS}
     for way in WAYS:
         assert figures[way]["fall_rate"] == 0
-        assert figures[way]["normalized_return"] > 60
+        assert figures[way]["normalized_return"] > 70
         assert figures[way]["plan_slip_median_mps"] < 0.03
     bending, telling, both = (figures[way] for way in ("bending", "telling", "both"))
     assert telling["bend_radps"] == telling["bend_mps"] == 0
