@@ -27,7 +27,8 @@ from loco_drake.motion.gaits import LABELS
 if TYPE_CHECKING:
     from loco_drake.datasets.segments import Segment
     from loco_drake.datasets.split import Split
-    from loco_drake.retargeting.retarget import Outcome, RetargetReport
+    from loco_drake.retargeting.report import RetargetReport
+    from loco_drake.retargeting.retarget import Outcome
 
 
 @dataclass(kw_only=True)
@@ -95,6 +96,9 @@ class Retarget(WorkerOptions):
     # held out for validation have none.
     steer: Annotated[int, option(name="steered")] = 0
     data_dir: DataDir = None
+    # Continue what is in --out: motions that an earlier run with the same options wrote
+    # are kept.
+    resume: bool = False
     # Exit with status 1 if a figure of a clip is outside its bounds.
     strict: bool = False
     json: Json = None
@@ -106,8 +110,9 @@ class Retarget(WorkerOptions):
 
         It is 1 if a clip failed, or is outside its bounds with --strict, else 0.
         """
-        from loco_drake.datasets.skeleton import load_source
+        from loco_drake.datasets.skeleton import load_source, loaded_files
         from loco_drake.models.robots import get_robot, load_robot
+        from loco_drake.retargeting.journal import Journal, settings_of
         from loco_drake.retargeting.retarget import retarget_segments
         from loco_drake.retargeting.scaling import Variant
 
@@ -122,7 +127,11 @@ class Retarget(WorkerOptions):
         variant = Variant(mirror=self.mirror, froude=self.froude, ground=self.ground)
         out = self.out or Path("motions") / f"{robot.name}{variant.suffix}"
         output.check_output(out, folder=True)
-        done = retarget_segments(segments, robot, out, split, executor, variant)
+        settings = settings_of(robot, variant, loaded_files())
+        journal = Journal(out, settings, split, resume=self.resume)
+        done = retarget_segments(
+            segments, robot, out, split, executor, variant, journal
+        )
         outcomes: list[Outcome] = []
         statuses = []
         # A disk that is full by then keeps nothing from being told of what was done.

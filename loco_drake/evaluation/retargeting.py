@@ -53,7 +53,8 @@ from loco_drake.motion.gait_timing import (
     motion_track,
 )
 from loco_drake.motion.quality import stance_slip_speeds, toe_trajectories
-from loco_drake.retargeting.retarget import RetargetReport, SegmentRetargeter
+from loco_drake.retargeting.report import RetargetReport
+from loco_drake.retargeting.retarget import SegmentRetargeter
 from loco_drake.retargeting.scaling import AS_RECORDED, Variant
 
 # The animal decides whether there are enough strides: a robot's motion can end a frame

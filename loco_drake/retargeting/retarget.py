@@ -2,10 +2,9 @@
 
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -32,8 +31,10 @@ from loco_drake.retargeting.contacts import (
     track_width,
 )
 from loco_drake.retargeting.correction import correct
-from loco_drake.retargeting.grounding import GroundingReport, ground
+from loco_drake.retargeting.grounding import ground
 from loco_drake.retargeting.inverse_kinematics import LegSolver
+from loco_drake.retargeting.journal import Journal
+from loco_drake.retargeting.report import RetargetReport
 from loco_drake.retargeting.scaling import (
     AS_RECORDED,
     RetargetConfig,
@@ -45,48 +46,6 @@ from loco_drake.retargeting.scaling import (
     smoothing_in_time,
 )
 from loco_drake.retargeting.trajectories import Stretch
-
-
-@dataclass(frozen=True)
-class RetargetReport:
-    """Quality of one retargeted clip, see :mod:`loco_drake.motion.quality`."""
-
-    frames: int  # of the motion
-    frames_per_second: float  # frames of the motion per second of computing
-    toe_error_rmse_m: float  # of the toes against the targets that the solver was given
-    correction_rmse_m: float  # of those targets against the paper's formula
-    # Of the trunk's position against the paper's formula.
-    trunk_correction_rmse_m: float
-    stance_slip_median_mps: float | None  # None if no toe ever stands
-    penetration_max_m: float  # deepest
-    joint_limit_violations: int  # number of joint angles
-    joint_speed_ratio_max: float  # highest speed over its limit
-    scale: float  # the robot's stance height over the animal's
-    time_scale: float  # how long the motion lasts, over the recording
-    mirrored: bool  # whether left and right are exchanged
-    # Share of the recording's frames in which the animal is on its feet; None where the
-    # source's configuration says how high it stands.
-    on_feet_share: float | None
-    # Those frames, in the recording's numbers, such as "240-420".
-    on_feet_frames: str | None
-    # Median height of the recording's trunk over the stance height that the scale is
-    # of.
-    trunk_height_ratio: float
-    # Share of the frames in which a toe is on its own side of the trunk, and a front
-    # toe ahead of the rear one, of the worst toe.
-    toes_in_place_share: float
-    # How far left of the right toes the recording's left ones are.
-    source_track_m: float
-    unsolved_frames: int  # for which inverse kinematics found no solution
-    # A sentence for each figure outside its bound, see bounds.
-    warnings: tuple[str, ...] = ()
-    grounding: GroundingReport | None = None  # None if the motion was not grounded
-
-    @property
-    def figures(self) -> dict[str, Any]:
-        """The figures by name, those of grounding, if there are any, among them."""
-        figures = asdict(self)
-        return figures | (figures.pop("grounding") or {})
 
 
 def retarget_clip(
@@ -222,28 +181,40 @@ def retarget_segments(
     split: Split | None = None,
     executor: Executor = LOCAL,
     variant: Variant = AS_RECORDED,
+    journal: Journal | None = None,
 ) -> Iterator[Outcome]:
     """Retargets segments, and writes ``out_dir/SEGMENT.npz`` for each.
 
     The folder is made if need be, and files of the same name are replaced. A recording
     that cannot be read or retargeted is reported in its outcome and does not stop the
     others. Each worker has only one clip at a time in memory; this process writes the
-    files.
+    files. Motions that ``journal`` finds are kept as they are; it notes the others.
 
     Yields:
         One outcome for each segment, in their order, as soon as it is done.
     """
     segments = list(segments)
+    paths = [Path(out_dir) / f"{segment.name}.npz" for segment in segments]
+    kept = [
+        None if journal is None else journal.find(segment, path)
+        for segment, path in zip(segments, paths, strict=True)
+    ]
     make = partial(_Encoder, robot.definition, split, variant, loaded_files())
-    done = executor.map(make, segments)
-    for segment, result in zip(segments, done, strict=True):
-        path = Path(out_dir) / f"{segment.name}.npz"
+    missing = [s for s, report in zip(segments, kept, strict=True) if report is None]
+    done = executor.map(make, missing)
+    for segment, path, report in zip(segments, paths, kept, strict=True):
+        if report is not None:
+            yield Outcome(segment, path, report, None)
+            continue
+        result = next(done)
         if isinstance(result, str):
             yield Outcome(segment, path, None, result)
             continue
-        content, report = result
+        content, made = result
         write_motion(content, path)
-        yield Outcome(segment, path, report, None)
+        if journal is not None:
+            journal.note(segment, path, made)
+        yield Outcome(segment, path, made, None)
 
 
 class _Encoder:

@@ -46,6 +46,30 @@ def test_batch_writes_motions_json_and_table(made_data, tmp_path, capsys):
     assert all(name in printed for name in names)
 
 
+def test_a_run_that_was_stopped_is_continued(made_data, tmp_path, capsys):
+    """Figures and files are those of a run in one go; another choice keeps what fits."""
+    out, json_file = tmp_path / "out", tmp_path / "a.json"
+    line = ("--data-dir", made_data, "--out", out, "--json", json_file)
+    gaits = ("--gait", "pace", "--gait", "trot")
+    with pytest.raises(InputError, match=r"no run of retarget in .*--resume"):
+        command(*line, *gaits, "--resume").run()
+    assert not out.exists()
+    assert command(*line, *gaits).run() == 0
+    first = json.loads(json_file.read_text())
+    motion = out / "dog-trot-made_trot-0-240.npz"
+    content = motion.read_bytes()
+    motion.unlink()
+    assert command(*line, *gaits, "--resume").run() == 0
+    again = json.loads(json_file.read_text())
+    for name, figures in first.items():
+        speeds = [x.pop("frames_per_second") for x in (figures, again[name])]
+        assert (speeds[0] == speeds[1]) == ("pace" in name)
+    assert again == first
+    assert motion.read_bytes() == content
+    with pytest.raises(InputError, match="made with other mirror;"):
+        command(*line, *gaits, "--resume", "--mirror").run()
+
+
 def test_files_tell_their_side_and_trajectories_are_cut(made_data, tmp_path, capsys):
     """A pace of 4 s, 200 frames, holds two; both processes write the same split."""
     out = tmp_path / "go2"

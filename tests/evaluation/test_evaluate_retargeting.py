@@ -14,7 +14,7 @@ from loco_drake.evaluation.retargeting import (
     summarize,
 )
 from loco_drake.models.robots import get_robot
-from loco_drake.retargeting.retarget import RetargetReport
+from loco_drake.retargeting.report import RetargetReport
 
 
 def score(gait="trot", name="a", frames=100, fidelity=None, slips=(), **changes):
