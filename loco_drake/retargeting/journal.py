@@ -1,7 +1,8 @@
 """What a run of ``retarget`` has done, so that one that was stopped can go on.
 
 A hidden file beside the Motion files has a line of JSON that says how they were made,
-and one for each that was written. A line that a kill tore is as if it were not there.
+and one for each that was written. A line that was torn by a kill, or damaged, is as if it
+were not there.
 """
 
 import json
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from loco_drake.common.errors import InputError
-from loco_drake.common.files import parse_json
+from loco_drake.common.files import content_sha256, parse_json
 from loco_drake.common.typed import FieldError, convert
 from loco_drake.datasets.segments import Segment
 from loco_drake.datasets.split import Split
@@ -88,8 +89,8 @@ class Journal:
         }
         with self._path.open("a" if self._begun else "w") as file:
             if not self._begun:
-                file.write(json.dumps(self._settings) + "\n")
-            file.write(json.dumps(entry) + "\n")
+                file.write(_line(self._settings))
+            file.write(_line(entry))
         self._begun = True
 
     def _key(self, segment: Segment) -> Entry:
@@ -125,9 +126,15 @@ class Journal:
         return {str(entry.get("name")): entry for entry in others if entry is not None}
 
 
+def _line(entry: Entry) -> str:
+    return json.dumps({"entry": entry, "sha256": content_sha256(entry, {})}) + "\n"
+
+
 def _parsed(line: bytes) -> Entry | None:
     try:
         value = parse_json(line.decode())
-    except (ValueError, InputError):
+    except ValueError:
         return None
-    return value if isinstance(value, dict) else None
+    entry = value.get("entry")
+    whole = isinstance(entry, dict) and content_sha256(entry, {}) == value.get("sha256")
+    return entry if whole else None

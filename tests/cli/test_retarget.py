@@ -47,7 +47,7 @@ def test_batch_writes_motions_json_and_table(made_data, tmp_path, capsys):
 
 
 def test_a_run_that_was_stopped_is_continued(made_data, tmp_path, capsys):
-    """Figures and files are those of a run in one go; another choice keeps what fits."""
+    """Figures and files are those of a run in one go, of the same options."""
     out, json_file = tmp_path / "out", tmp_path / "a.json"
     line = ("--data-dir", made_data, "--out", out, "--json", json_file)
     gaits = ("--gait", "pace", "--gait", "trot")

@@ -83,6 +83,10 @@ def test_what_was_changed_or_torn_is_done_again(run, segments, tmp_path):
     journal = out / JOURNAL
     journal.write_bytes(journal.read_bytes()[:-30])  # a kill
     assert run()[1] == names[2:]
+    run(resume=False)
+    whole = journal.read_bytes()
+    journal.write_bytes(whole.replace(b'"frames": 200', b'"frames": 201', 1))
+    assert run()[1] == names[:1]
     assert run()[1] == []
 
 
