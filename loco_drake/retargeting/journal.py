@@ -1,8 +1,8 @@
 """What a run of ``retarget`` has done, so that one that was stopped can go on.
 
 A hidden file beside the Motion files has a line of JSON that says how they were made,
-and one for each that was written. A line that was torn by a kill, or damaged, is as if it
-were not there.
+and one for each that was written. A line that was torn by a kill, or damaged, is as if
+it were not there.
 """
 
 import json
