@@ -1,7 +1,7 @@
 """How well recordings are retargeted, label by label.
 
 The figures of a clip are those of :mod:`loco_drake.motion.quality`,
-:class:`loco_drake.retargeting.retarget.RetargetReport` and :class:`GaitFidelity`. A
+:class:`loco_drake.retargeting.report.RetargetReport` and :class:`GaitFidelity`. A
 label's figures are made of its clips':
 
 * stance_slip_median_mps: median over all steps of all toes in stance of all clips

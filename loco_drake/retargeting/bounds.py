@@ -22,7 +22,7 @@ _FILE = Path(__file__).with_suffix(".yaml")
 
 @dataclass(frozen=True, kw_only=True)
 class Bound:
-    """The range of one figure of a :class:`.retarget.RetargetReport`."""
+    """The range of one figure of a :class:`.report.RetargetReport`."""
 
     name: str  # name of the figure in messages
     low: float = 0.0  # smallest value
