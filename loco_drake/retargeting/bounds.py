@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Report = TypeVar("Report", bound="DataclassInstance")
 
 _FILE = Path(__file__).with_suffix(".yaml")
+_AT_LIMIT = 0.99  # share of a joint's highest speed from which on it is held back
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,8 +66,18 @@ def outside_bounds(figures: Mapping[str, Any], robot: LeggedRobot) -> tuple[str,
             limits = f"at most {most}"
         if key == "on_feet_share" and "on_feet_frames" in figures:
             shown = f"{shown} ({figures['on_feet_frames']})"
-        found.append(f"{bound.name} {shown}, not {limits}")
+        why = _reason(figures) if key == "toe_error_rmse_m" else ""
+        found.append(f"{bound.name} {shown}, not {limits}{why}")
     return tuple(found)
+
+
+def _reason(figures: Mapping[str, Any]) -> str:
+    """Returns why toes are off their targets, as far as the figures tell."""
+    if figures.get("joint_speed_ratio_max", 0.0) < _AT_LIMIT:
+        return ""
+    larger = figures.get("scale", 0.0) > 1 and figures.get("time_scale") == 1
+    more = "; --froude gives a robot that is larger more time" if larger else ""
+    return f": joints are as fast as they can be{more}"
 
 
 def judged(motion: Motion, report: Report, robot: LeggedRobot) -> tuple[Motion, Report]:

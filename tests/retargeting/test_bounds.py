@@ -50,6 +50,20 @@ def test_each_figure_outside_its_bound_is_said_with_the_bound(clip, key):
     assert "nan" in sentence
 
 
+def test_toes_that_are_off_since_joints_are_too_slow_say_so(clip):
+    figures = asdict(retarget_clip(clip, get_robot("go2"))[1])
+    figures |= {"toe_error_rmse_m": 0.02, "time_scale": 1.0}
+    off = "toe error 20 mm, not at most 2 mm"
+    slow = f"{off}: joints are as fast as they can be"
+    for ratio, scale, sentence in (
+        (0.8, 1.5, off),
+        (0.999, 0.5, slow),
+        (0.999, 1.5, f"{slow}; --froude gives a robot that is larger more time"),
+    ):
+        figures |= {"joint_speed_ratio_max": ratio, "scale": scale}
+        assert outside_bounds(figures, get_robot("go2")) == (sentence,)
+
+
 def test_legs_that_cannot_be_put_aside_may_slip(clip):
     """.3 m/s to the side is what Solo8's planar legs do on a bend; the Go2's do not."""
     figures = asdict(retarget_clip(clip, get_robot("go2"))[1])
