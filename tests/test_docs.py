@@ -36,6 +36,12 @@ def test_modules_that_pages_name_exist(page):
             assert re.search(rf"^(def|class) {path.name}\b", module.read_text(), re.M)
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_no_line_is_lost_as_a_comment(page):
+    """Sphinx leaves out a line that begins with a percent sign."""
+    assert re.findall(r"^ *%.*", page.read_text(), re.M) == []
+
+
 def test_readme_lists_every_command():
     table = re.findall(r"^\| `loco-drake ([a-z ]+)` \|", readme(), flags=re.MULTILINE)
     assert table == list(_COMMANDS)
