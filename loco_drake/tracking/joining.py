@@ -1,6 +1,5 @@
 """A policy of two networks, from two that were trained by themselves."""
 
-from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,22 +26,19 @@ def joined(near: Actor, far: Actor, recovery: list[float] | None = None) -> Acto
     Raises:
         ValueError: if the networks do not fit.
     """
-    config = replace(near.config, recovery=recovery or RECOVERY)
-    actor = make_actor(config)
-    layers = deepcopy(far.layers)
-    first = layers[0]
-    assert isinstance(first, torch.nn.Linear)
     if near.config.hidden != far.config.hidden:
         raise ValueError("networks of other widths")
+    actor = make_actor(replace(near.config, recovery=recovery or RECOVERY))
+    actor.layers.load_state_dict(near.layers.state_dict())
+    actor.recovery.load_state_dict(far.layers.state_dict())
+    actor.mean.copy_(near.mean)
+    actor.variance.copy_(near.variance)
+    first = actor.recovery[0]
+    assert isinstance(first, torch.nn.Linear)
     with torch.no_grad():
         deviation = torch.sqrt(far.variance + 1e-8)
-        shift = first.weight @ ((near.mean - far.mean) / deviation)
-        first.bias.add_(shift)
+        first.bias.add_(first.weight @ ((near.mean - far.mean) / deviation))
         first.weight.mul_(torch.sqrt(near.variance + 1e-8) / deviation)
-        actor.layers.load_state_dict(near.layers.state_dict())
-        actor.recovery.load_state_dict(layers.state_dict())
-        actor.mean.copy_(near.mean)
-        actor.variance.copy_(near.variance)
     return actor.eval()
 
 
