@@ -96,8 +96,8 @@ class Retarget(WorkerOptions):
     # held out for validation have none.
     steer: Annotated[int, option(name="steered")] = 0
     data_dir: DataDir = None
-    # Continue what is in --out: motions that an earlier run with the same options wrote
-    # are kept.
+    # Continue a run that was stopped: motions that it wrote to --out with the same
+    # options are kept.
     resume: bool = False
     # Exit with status 1 if a figure of a clip is outside its bounds.
     strict: bool = False
@@ -139,6 +139,7 @@ class Retarget(WorkerOptions):
             lambda: outcomes.extend(output.tracked(done, "Retargeting", len(segments))),
             lambda: statuses.append(self._tell(robot.definition, out, outcomes, split)),
         )
+        journal.end()
         return statuses[0]
 
     def _tell(

@@ -2,7 +2,7 @@
 
 A hidden file beside the Motion files has a line of JSON that says how they were made,
 and one for each that was written. A line that was torn by a kill, or damaged, is as if
-it were not there.
+it were not there. A run that comes to its end leaves no such file.
 """
 
 import json
@@ -93,6 +93,10 @@ class Journal:
             file.write(_line(entry))
         self._begun = True
 
+    def end(self) -> None:
+        """Forgets the run, which has come to its end."""
+        self._path.unlink(missing_ok=True)
+
     def _key(self, segment: Segment) -> Entry:
         recording = segment.path.stat()
         return {
@@ -109,8 +113,8 @@ class Journal:
         folder = str(self._path.parent)
         if first is None:
             raise InputError(
-                f"There is no run of retarget in {folder!r} to go on with; leave out "
-                "--resume."
+                f"No run of retarget in {folder!r} was stopped that could go on; leave "
+                "out --resume."
             )
         differ = [
             name for name, own in self._settings.items() if first.get(name) != own

@@ -91,7 +91,7 @@ def test_what_was_changed_or_torn_is_done_again(run, segments, tmp_path):
 
 
 def test_other_settings_and_no_run_are_refused(run, tmp_path):
-    with pytest.raises(InputError, match="no run of retarget"):
+    with pytest.raises(InputError, match="No run of retarget"):
         run()
     run(1, resume=False)
     mirrored = settings_of(get_robot("go2"), Variant(mirror=True))
@@ -101,5 +101,5 @@ def test_other_settings_and_no_run_are_refused(run, tmp_path):
     with pytest.raises(InputError, match="with other robot;"):
         run(settings=a1)
     (tmp_path / "out" / JOURNAL).write_bytes(b"\xff")
-    with pytest.raises(InputError, match="no run of retarget"):
+    with pytest.raises(InputError, match="No run of retarget"):
         run()
