@@ -8,12 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from loco_drake.common.arrays import Bools
 from loco_drake.common.errors import InputError
 from loco_drake.datasets.segments import Segment
 from loco_drake.datasets.skeleton import load_sources, loaded_files
 from loco_drake.datasets.split import Split
 from loco_drake.engine.executor import Executor
 from loco_drake.engine.local import LOCAL
+from loco_drake.models.legs import MIRROR_LEGS
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.models.robots import get_robot, load_robot
 from loco_drake.motion import quality
@@ -55,11 +57,13 @@ def retarget_clip(
     config: RetargetConfig | None = None,
     solver: LegSolver | None = None,
     variant: Variant = AS_RECORDED,
+    contacts: Bools | None = None,
 ) -> tuple[Motion, RetargetReport]:
     """Returns ``clip`` as a motion of ``robot`` at 50 Hz, and a report on its quality.
 
     ``config`` is that of the clip's source by default; a ``solver`` of the robot can be
-    used again for many clips.
+    used again for many clips. ``contacts`` of the clip's feet, (T, 4), are detected
+    unless they are known.
 
     Raises:
         InputError: if the clip is too short or not of an animal on its feet.
@@ -70,7 +74,7 @@ def retarget_clip(
     clip = clip.mirrored() if variant.mirror else clip
     height = stance_height(clip, config)
     scale = robot.stand_height / height
-    raw_contacts = detect_contacts(clip, height, config.contact)
+    raw_contacts = _contacts(clip, height, config, contacts, variant)
     time_scale = variant.time_scale(scale)
     timed = in_time(clip, time_scale)
     resampled = resample(timed, FPS)
@@ -122,6 +126,19 @@ def retarget_clip(
         grounding=grounding,
     )
     return judged(motion, report, robot)
+
+
+def _contacts(
+    clip: KeypointClip,
+    height: float,
+    config: RetargetConfig,
+    known: Bools | None,
+    variant: Variant,
+) -> Bools:
+    """Returns the contacts of a clip, which is mirrored already, unlike ``known``."""
+    if known is None:
+        return detect_contacts(clip, height, config.contact)
+    return known[:, MIRROR_LEGS] if variant.mirror else known
 
 
 @dataclass(frozen=True)
