@@ -5,9 +5,9 @@ all frames of its recordings. Over all labels they are the root of the mean squa
 labels. Codebook usage is the share of all codes that occur in the recordings of both
 sets and their mirror images.
 
-``transfer_joint_rmse_rad`` measures whether tokens mean the same for both robots: the
-Go2's motion of a recording is encoded as the Go2's, decoded for the A1, and compared
-with the A1's own retargeted motion, RMS over all frames and joints.
+``transfer_joint_rmse_rad`` measures whether tokens mean the same for two robots: the
+Go2's motion of a recording is encoded as the Go2's, decoded for the other robot, and
+compared with that robot's own retargeted motion, RMS over all frames and joints.
 """
 
 from collections.abc import Sequence
@@ -100,7 +100,8 @@ def transfer_rmse(
         with torch.inference_mode(), single_thread():
             batch = torch.tensor(features[None, :frames], dtype=torch.float32)
             decoded = tokenizer.decode(tokenizer.encode(batch, source), target)
-        joints = decoded[0, :, JOINTS].numpy()
+        angles = decoded[0, :, JOINTS].numpy()
+        joints = get_robot(wanted.robot).joints_of_backward(angles)
         squares.append((joints - wanted.joint_positions[:frames]).ravel() ** 2)
     return float(np.sqrt(np.concatenate(squares).mean()))
 

@@ -37,6 +37,8 @@ class TokenizerConfig:
     # Those of ``robots``, the last ones, that were added after the training: codes mean
     # the same as before. The fingerprint does not depend on them.
     added: tuple[str, ...] = field(default=(), repr=False)
+    # Those of ``added``, the last ones, that have layers of their own.
+    bodies: tuple[str, ...] = field(default=(), repr=False)
 
 
 # Weights that have a row for each robot.
@@ -80,6 +82,17 @@ class ConvBlock(nn.Module):
         return out
 
 
+class BodyLayers(nn.Module):
+    """A robot's own layers, where features come in and go out."""
+
+    def __init__(self, config: TokenizerConfig) -> None:
+        super().__init__()
+        frames = config.frames_per_token
+        self.encoder_in = nn.Linear(SIZE * frames, config.width)
+        self.expand = nn.Linear(config.width, frames * config.frame_width)
+        self.decoder_out = nn.Linear(config.frame_width, SIZE)
+
+
 class Tokenizer(nn.Module):
     """A VQ-VAE: encoder, residual codebooks, decoder, feature statistics.
 
@@ -114,6 +127,7 @@ class Tokenizer(nn.Module):
         self.expand = nn.Linear(width, frames * config.frame_width)
         self.smooth = nn.Sequential(*smooth)
         self.decoder_out = nn.Linear(config.frame_width, SIZE)
+        self.bodies = nn.ModuleList(BodyLayers(config) for _ in config.bodies)
         # Number of earlier tokens that the frames of a token can depend on.
         self.memory = sum(block.reach for block in decoder) + math.ceil(
             sum(block.reach for block in smooth) / frames
@@ -134,7 +148,7 @@ class Tokenizer(nn.Module):
         batch, frames, _ = features.shape
         x = (features - self.mean) / self.std
         x = x.view(batch, frames // self.config.frames_per_token, -1)
-        x = self.encoder_in(x) + self.encoder_robot(robot)[:, None]
+        x = self._by_body("encoder_in", x, robot) + self.encoder_robot(robot)[:, None]
         out: Tensor = self.encoder_out(self.encoder(x))
         return out
 
@@ -168,12 +182,23 @@ class Tokenizer(nn.Module):
     def decode_embedded(self, embedded: Tensor, robot: Tensor) -> Tensor:
         """Decodes vectors (B, n, code_size); contacts are logits."""
         x = self.decoder_in(embedded) + self.decoder_robot(robot)[:, None]
-        x = self.expand(self.decoder(x))  # (B, n, frames * frame_width)
+        # (B, n, frames * frame_width)
+        x = self._by_body("expand", self.decoder(x), robot)
         x = x.view(x.shape[0], -1, self.config.frame_width)
-        x = self.decoder_out(self.smooth(x))
+        x = self._by_body("decoder_out", self.smooth(x), robot)
         # Denormalize all features except the contact logits.
         scaled = x * self.std + self.mean
         return torch.cat((scaled[..., : CONTACTS.start], x[..., CONTACTS]), dim=-1)
+
+    def _by_body(self, layer: str, x: Tensor, robot: Tensor) -> Tensor:
+        """Applies the layer of that name, each robot's own, to x (B, T, width)."""
+        out: Tensor = getattr(self, layer)(x)
+        first = len(self.config.robots) - len(self.bodies)
+        for index, body in enumerate(self.bodies, first):
+            own = robot == index
+            if own.any():
+                out = torch.where(own[:, None, None], getattr(body, layer)(x), out)
+        return out
 
     @property
     def fingerprint(self) -> str:
@@ -187,6 +212,8 @@ class Tokenizer(nn.Module):
         # With the field names of the first weights.
         digest = sha256(repr(config).replace("codebook", "book").encode())
         for name, value in sorted(self.state_dict().items()):
+            if name.startswith("bodies."):
+                continue
             if name in BODY_ROWS:
                 value = value[:first]
             data = value.half() if value.is_floating_point() else value

@@ -1,8 +1,9 @@
 """Teaching a tokenizer robots that it does not know, and nothing else.
 
-Encoder and decoder are told the robot by a row that is added to their hidden layer.
-Rows of further robots are learned, all else is held: what a code means, and how robots
-are decoded that the tokenizer knows, remains the same to the last bit.
+Encoder and decoder are told the robot by a row that is added to their hidden layer. A
+further robot learns a row, and layers of its own where features come in and go out; all
+else is held. What a code means, and how robots are decoded that the tokenizer knows,
+remains the same to the last bit.
 """
 
 from collections.abc import Iterable
@@ -20,7 +21,12 @@ from loco_drake.common.errors import InputError
 from loco_drake.common.weights import save_network
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.point_masses import PointMasses
-from loco_drake.generation.tokenizer import BODY_ROWS, Tokenizer, load_tokenizer
+from loco_drake.generation.tokenizer import (
+    BODY_ROWS,
+    BodyLayers,
+    Tokenizer,
+    load_tokenizer,
+)
 from loco_drake.generation.tokenizer_score import Toes
 from loco_drake.generation.train_tokenizer import (
     BATCH,
@@ -82,9 +88,9 @@ def train_bodies(
         name.removesuffix(".weight"): _Rows(base.state_dict()[name], len(names))
         for name in BODY_ROWS
     }
-    grown = _grown(base, names, rows.values())
-    learning = nn.ModuleDict(rows)
-    # Of which the rows are the ones that are learned.
+    grown = _grown(base, names)
+    own = grown.bodies[-len(names) :].requires_grad_(True)
+    learning = nn.ModuleDict({**rows, "bodies": own})
     for name, row in rows.items():
         setattr(grown, name, row)
     device = find_device(settings.device)
@@ -109,7 +115,8 @@ def train_bodies(
         "base": base.fingerprint,
     }
     result = train("tokenizer", learning, loss_of_batch, settings, run)
-    tokenizer = _grown(base, names, rows.values())
+    grown.cpu()
+    tokenizer = _finished(grown, rows.values())
     if not result.stopped:
         labels = [str(label) for label in library.labels]
         info = {"labels": labels, "training": _record(library, settings, path)}
@@ -148,17 +155,32 @@ class _Held:
         return self._tokenizer.decode_embedded(repeated, decoded_for), commitment
 
 
-def _grown(base: Tokenizer, names: tuple[str, ...], rows: Iterable[_Rows]) -> Tokenizer:
-    """Returns ``base`` with further robots, ready for inference."""
+def _grown(base: Tokenizer, names: tuple[str, ...]) -> Tokenizer:
+    """Returns ``base`` with further robots, which have the layers of all as their own.
+
+    Their rows are those of the first robot.
+    """
     config = replace(
         base.config,
         robots=(*base.config.robots, *names),
         added=(*base.config.added, *names),
+        bodies=(*base.config.bodies, *names),
     )
-    tokenizer = Tokenizer(config)
-    weights = {
-        name: row.weight.detach().clone()
-        for name, row in zip(BODY_ROWS, rows, strict=True)
-    }
-    tokenizer.load_state_dict(base.state_dict() | weights)
+    tokenizer, state = Tokenizer(config), base.state_dict()
+    for name in BODY_ROWS:
+        state[name] = torch.cat((state[name], state[name][:1].repeat(len(names), 1)))
+    for index in range(len(base.config.bodies), len(config.bodies)):
+        for name in BodyLayers(config).state_dict():
+            state[f"bodies.{index}.{name}"] = state[name]
+    tokenizer.load_state_dict(state)
+    return tokenizer.eval().requires_grad_(False)
+
+
+def _finished(grown: Tokenizer, rows: Iterable[_Rows]) -> Tokenizer:
+    """Returns a tokenizer that has learned ``rows``, ready for inference."""
+    tokenizer, state = Tokenizer(grown.config), grown.state_dict()
+    for name, row in zip(BODY_ROWS, rows, strict=True):
+        del state[name.replace("weight", "new")]
+        state[name] = row.weight.detach()
+    tokenizer.load_state_dict(state)
     return tokenizer.eval().requires_grad_(False)
