@@ -18,8 +18,13 @@ class TrainRecipe:
     docs/tracking.md. Ctrl-C stops it; --resume continues from the last update.
     """
 
-    # A shipped recipe (go2, a1) or a YAML file. Required without --resume.
+    # A shipped recipe (go2, a1, and own for a robot of one's own), or a YAML file.
+    # Required without --resume.
     recipe: Annotated[Path | None, option(metavar="NAME|FILE")] = None
+    # Robot: go2, a1, or the YAML file of another, see docs/own_robot.md.
+    robot: Annotated[
+        str | None, option(metavar="ROBOT|FILE", default="that of the recipe")
+    ] = None
     # Folder to write to: motions, a run folder for each stage, and the policy.
     out: OutFolder = Path("runs/recipe")
     # Continue what is in --out: where it was stopped. A recipe that is given again must
@@ -42,12 +47,12 @@ class TrainRecipe:
         check_at_least("workers", self.workers, 1)
         recipe = None
         if self.recipe is not None:
-            recipe = scaled(read_recipe(self.recipe), self.scale)
+            recipe = scaled(read_recipe(self.recipe, self.robot), self.scale)
             recipe.seed = recipe.seed if self.seed is None else self.seed
         elif not self.resume:
             raise InputError("--recipe must name a shipped recipe or a YAML file.")
-        elif self.seed is not None or self.scale != 1.0:
-            raise InputError("--seed and --scale go with --recipe.")
+        elif (self.robot, self.seed, self.scale) != (None, None, 1.0):
+            raise InputError("--robot, --seed and --scale go with --recipe.")
         with progress_bar() as bar:
             task, doing = bar.add_task("recipe", total=None, note=""), ""
 

@@ -19,12 +19,14 @@ from loco_drake.common.files import atomic_path
 from loco_drake.common.typed import FieldError, convert
 from loco_drake.common.typed_yaml import read_yaml
 from loco_drake.generation.generate import check_duration
+from loco_drake.models.robot_files import is_robot_file
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import LABELS, GaitLabel, parse_label
 from loco_drake.tracking.config import TrainingConfig
 
 ALL = "all"
 EVALUATION = "evaluation"  # name of the motions to evaluate on
+BODY = "body"  # name of the motions that a robot's body is learned from
 _SHIPPED = Path(__file__).parent / "recipes"
 
 
@@ -100,6 +102,28 @@ class Evaluation:
 
 
 @dataclass(kw_only=True)
+class Body:
+    """How the tokenizer learns a robot that it does not know, see recipe_body."""
+
+    # Motion of the Go2 that is retargeted to the robot.
+    motions: ReferenceSet = field(
+        default_factory=lambda: ReferenceSet(count=8, first_seed=3000)
+    )
+    # Steps of the tokenizer's training.
+    steps: int = 5000
+
+    def check(self) -> None:
+        """Raises InputError unless it can be done."""
+        self.motions.check(BODY)
+        check_bounds("The recipe's body: steps", self.steps, 1)
+        if self.motions.steered or self.motions.grounded or self.motions.folder:
+            raise InputError(
+                "The recipe's body learns from motion that is generated and grounded, "
+                "and has no steered, grounded or folder."
+            )
+
+
+@dataclass(kw_only=True)
 class Common:
     """Options of `train tracker` in all stages, where they differ from its defaults."""
 
@@ -133,7 +157,7 @@ class Before:
 class Recipe:
     """What a robot's policy is trained by, from nothing to its weights."""
 
-    # Robot: go2 or a1.
+    # Robot: go2, a1, or the YAML file of another.
     robot: str = "go2"
     # Seed of the trainings; that of stage k, counted from 0, is larger by k.
     seed: int = 0
@@ -142,6 +166,8 @@ class Recipe:
     # Networks of the first stage: null for new ones, a shipped policy such as go2, or
     # the policy.safetensors or checkpoint.safetensors of a run; of any robot.
     start_from: Path | None = None
+    # How the tokenizer learns the robot first, unless it knows it; null for not at all.
+    body: Body | None = None
     # Stages to do first, whose networks the first stage begins with; null for none.
     before: Before | None = None
     # What to train on, by name.
@@ -165,6 +191,8 @@ class Recipe:
             if self.start_from is not None:
                 raise InputError("A recipe has either start_from or before.")
             self.before.read()
+        if self.body is not None:
+            self.body.check()
         if EVALUATION in self.references:
             raise InputError(f"No references can be called {EVALUATION!r}.")
         if self.evaluation is not None:
@@ -234,8 +262,10 @@ class Recipe:
         return config
 
 
-def read_recipe(name: Path) -> Recipe:
+def read_recipe(name: Path, robot: str | None = None) -> Recipe:
     """Returns a recipe: a YAML file, or a shipped one by its name, such as go2.
+
+    It is for ``robot`` if that is given.
 
     Raises:
         InputError: if there is none of that name, or it is unsound.
@@ -250,6 +280,9 @@ def read_recipe(name: Path) -> Recipe:
             )
         path = shipped[str(name)]
     recipe = read_yaml(path, Recipe, "a recipe")
+    if robot is not None:
+        # A run goes on from any folder.
+        recipe.robot = str(Path(robot).resolve()) if is_robot_file(robot) else robot
     recipe.check()
     return recipe
 
@@ -260,8 +293,8 @@ def write_recipe(recipe: Recipe, path: Path) -> None:
     parts = [values, *values["references"].values()]
     if recipe.before is not None:
         parts.append(values["before"])
-    if recipe.evaluation is not None:
-        parts.append(values["evaluation"]["motions"])
+    for name in (EVALUATION, BODY):
+        parts += [] if values[name] is None else [values[name]["motions"]]
     for part in parts:
         part.update((k, str(v)) for k, v in part.items() if isinstance(v, Path))
     with atomic_path(path) as temporary:
@@ -276,6 +309,9 @@ def scaled(recipe: Recipe, scale: float) -> Recipe:
         stage.steps = max(1, round(scale * stage.steps))
     for references in copy.references.values():
         references.count = max(1, round(scale * references.count))
+    if (body := copy.body) is not None:
+        body.steps = max(1, round(scale * body.steps))
+        body.motions.count = max(1, round(scale * body.motions.count))
     if copy.evaluation is not None:
         copy.evaluation.every = max(1, round(scale * copy.evaluation.every))
     return copy

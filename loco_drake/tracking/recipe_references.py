@@ -10,9 +10,9 @@ from loco_drake.common.errors import InputError
 from loco_drake.common.files import read_json, write_json
 from loco_drake.control.motion_batches import batches, finished
 from loco_drake.generation.generate import generate_motions
-from loco_drake.generation.motion_model import pretrained_motion_model
+from loco_drake.generation.motion_model import MotionModel, load_motion_model
 from loco_drake.models.robots import Robot
-from loco_drake.models.shipped import pretrained_path
+from loco_drake.models.shipped import network_path
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.motion_file import save_motion
 from loco_drake.retargeting.inverse_kinematics import LegSolver
@@ -29,6 +29,7 @@ def make_references(
     folder: Path,
     report: Callable[[int, int], None] = lambda done, total: None,
     stopped: Callable[[], bool] = lambda: False,
+    tokenizer: Path | None = None,
 ) -> bool:
     """Writes the motions of a set to ``folder``, if they are not there yet.
 
@@ -40,6 +41,7 @@ def make_references(
         folder: for the Motion files and ``references.json``.
         report: is told how many of how many are there.
         stopped: asked before each batch.
+        tokenizer: by default the shipped one, or the robot's own.
 
     Returns:
         Whether all motions are there now.
@@ -60,7 +62,12 @@ def make_references(
             )
         if found.get("complete") is True:
             return True
-    made = {"set": asked, "made_by": _weights() if references.folder is None else {}}
+    files = {
+        "tokenizer": tokenizer or network_path(robot, "tokenizer"),
+        "generator": network_path(robot, "generator"),
+    }
+    made_by = {x: sha256(path.read_bytes()).hexdigest() for x, path in files.items()}
+    made = {"set": asked, "made_by": made_by if references.folder is None else {}}
     if found and found.get("made_by") != made["made_by"]:
         raise InputError(
             f"{str(folder)!r} was begun with other weights of tokenizer and generator; "
@@ -69,21 +76,24 @@ def make_references(
     write_json(mark, {**made, "complete": False})
     for unfinished in folder.glob(".*.npz"):
         unfinished.unlink()  # left by a process that was killed
-    make = _generate if references.folder is None else _copy
-    complete = make(robot, references, folder, report, stopped)
+    if references.folder is None:
+        model = load_motion_model(**files, robot=robot.definition)
+        complete = _generate(model, references, folder, report, stopped)
+    else:
+        complete = _copy(robot, references, folder, report, stopped)
     if complete:
         write_json(mark, {**made, "complete": True})
     return complete
 
 
 def _generate(
-    robot: Robot,
+    model: MotionModel,
     references: ReferenceSet,
     folder: Path,
     report: Callable[[int, int], None],
     stopped: Callable[[], bool],
 ) -> bool:
-    model = pretrained_motion_model(robot.definition)
+    robot = model.robot
     solver = LegSolver(robot, FPS) if references.grounded else None
     total, done = len(references.gaits) * references.count, 0
     for label in references.gaits:
@@ -117,9 +127,3 @@ def _copy(
         save_motion(motion, folder / path.name)
         report(done + 1, len(motions))
     return True
-
-
-def _weights() -> dict[str, str]:
-    """Returns the hashes of the files that generate motion."""
-    names = ("tokenizer", "generator")
-    return {x: sha256(pretrained_path(x).read_bytes()).hexdigest() for x in names}

@@ -10,7 +10,7 @@ from typing import Any
 
 from loco_drake.common.determinism import single_thread
 from loco_drake.common.errors import InputError, quoted
-from loco_drake.common.files import atomic_path, read_json, write_json
+from loco_drake.common.files import atomic_path, write_json
 from loco_drake.common.run_folder import CHECKPOINT, locked, stop_requests
 from loco_drake.control.actor_file import halve_policy
 from loco_drake.control.plan import Plan
@@ -18,25 +18,35 @@ from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import training_path
 from loco_drake.tracking.beginning import read_beginning
 from loco_drake.tracking.joining import join_policies
-from loco_drake.tracking.learning_curve import PROGRESS, learning_curve
 from loco_drake.tracking.recipe import (
+    BODY,
     EVALUATION,
     Recipe,
     Stage,
     read_recipe,
     write_recipe,
 )
-from loco_drake.tracking.recipe_evaluation import Evaluator, read_points, steps_to_goal
+from loco_drake.tracking.recipe_body import knows, make_body
+from loco_drake.tracking.recipe_evaluation import Evaluator
+from loco_drake.tracking.recipe_folder import (
+    BEFORE,
+    CURVE,
+    FIGURES,
+    POINTS,
+    RECIPE,
+    REFERENCES,
+    START,
+    TOKENIZER,
+    check_recipe_folder,
+    recipe_curve,
+    stage_folder,
+)
 from loco_drake.tracking.recipe_references import make_references
 from loco_drake.tracking.references import load_references
 from loco_drake.tracking.train import POLICY, train_tracker
 
-RECIPE, CURVE, REFERENCES = "recipe.yaml", "curve.json", "references"
-BEFORE = "before"  # folder of the stages of another recipe
-# What a stage ended with; written when nothing is left to do in its folder.
-FIGURES = "figures.json"
-_START = "start.safetensors"
-_POINTS = "evaluation.json"
+# What must be the same if a run goes on.
+_WHOLE = ("robot", "seed", "environments", "start_from", "before", "body")
 _BOTH = "both.safetensors"  # the policy in 32 bits, while it is written
 
 # Is told what is being done, how much of it is done and of how much, and a note.
@@ -81,86 +91,18 @@ def run_recipe(
         evaluator = None
         if recipe.evaluation is not None:
             motions = folder / REFERENCES / EVALUATION
-            evaluator = Evaluator(recipe, motions, folder / _POINTS)
+            evaluator = Evaluator(recipe, motions, folder / POINTS)
         run = _Run(folder, recipe, workers, report, stop, evaluator)
         if resume:
             run.check_continues(read_recipe(folder / RECIPE))
         run.begin(resume=resume)
-        interrupted = not (run.do_before() and run.make_references() and run.train())
+        done = run.do_before() and run.make_body() and run.make_references()
+        interrupted = not (done and run.train())
         if not interrupted:
             run.finish()
         curve = recipe_curve(folder, recipe)
         write_json(folder / CURVE, curve)
     return {"robot": recipe.robot, "interrupted": interrupted, **curve}
-
-
-def check_recipe_folder(folder: Path, *, resume: bool) -> None:
-    """Raises InputError if a recipe cannot begin, or go on, in ``folder``."""
-    found = [x for x in (RECIPE, POLICY, CHECKPOINT) if (folder / x).exists()]
-    found += sorted(path.name for path in folder.glob("[0-9]*-*"))
-    if resume and RECIPE not in found:
-        raise InputError(
-            f"There is no recipe to resume in {str(folder)!r}, which has no {RECIPE}; "
-            "to begin one, leave out --resume."
-        )
-    if found and not resume:
-        raise InputError(
-            f"{str(folder)!r} holds a run already ({', '.join(found)}); resume it "
-            "with --resume, or name another folder with --out."
-        )
-
-
-def stage_folder(folder: Path, recipe: Recipe, index: int) -> Path:
-    """Returns the folder of a stage, such as ``2-steered``; the index begins at 0."""
-    return folder / f"{index + 1}-{recipe.stages[index].name}"
-
-
-def recipe_curve(folder: Path, recipe: Recipe) -> dict[str, Any]:
-    """Returns the learning curve of all stages, one after the other.
-
-    Returns:
-        "steps" and "seconds" of all stages so far, those of a recipe before this one
-        included; "stages" with the name of each that has begun and the steps at which
-        it did; and "curve" with "steps", "seconds" and
-        "return": the mean over its labels of the normalized return (0-100) of recent
-        training episodes, see :func:`.learning_curve`. "evaluation" has the points of
-        :class:`.Evaluator`, and "steps_to_90" the steps of its first return of 90, or
-        None.
-    """
-    stages: list[dict[str, Any]] = []
-    curve: dict[str, list[Any]] = {"steps": [], "seconds": [], "return": []}
-    steps, seconds = 0, 0.0
-    if recipe.before is not None:
-        earlier = recipe_curve(folder / BEFORE, recipe.before.read())
-        steps, seconds = earlier["steps"], earlier["seconds"]
-    for index, stage in enumerate(recipe.stages):
-        own = stage_folder(folder, recipe, index)
-        if not own.is_dir():
-            break
-        stages.append({"name": stage.name, "first_step": steps})
-        log = (
-            learning_curve(own / PROGRESS)
-            if (own / PROGRESS).is_file()
-            else {"steps": [], "seconds": [], "return": {}}
-        )
-        curve["steps"] += [steps + x for x in log["steps"]]
-        curve["seconds"] += [round(seconds + x, 1) for x in log["seconds"]]
-        for scores in zip(*log["return"].values(), strict=True):
-            known = [score for score in scores if score is not None]
-            curve["return"].append(round(sum(known) / len(known), 2))
-        ended = own / FIGURES
-        done = read_json(ended) if ended.is_file() else {}
-        steps += int(done.get("steps", max(log["steps"], default=0)))
-        seconds = max(curve["seconds"], default=seconds)
-    points = read_points(folder / _POINTS)
-    return {
-        "steps": steps,
-        "seconds": seconds,
-        "stages": stages,
-        "curve": curve,
-        "evaluation": [asdict(point) for point in points],
-        "steps_to_90": steps_to_goal(points),
-    }
 
 
 @dataclass(frozen=True)
@@ -180,11 +122,7 @@ class _Run:
     def check_continues(self, before: Recipe) -> None:
         """Raises InputError unless what has begun would be the same by ``before``."""
         old, new = asdict(before), asdict(self.recipe)
-        differ = [
-            name
-            for name in ("robot", "seed", "environments", "start_from", "before")
-            if old[name] != new[name]
-        ]
+        differ = [name for name in _WHOLE if old[name] != new[name]]
         kept = {x: new["references"].get(x) for x in old["references"]}
         if kept != old["references"]:
             differ.append("references")
@@ -205,7 +143,7 @@ class _Run:
 
     def begin(self, *, resume: bool) -> None:
         """Writes the recipe, and what the first stage starts from."""
-        start = self.folder / _START
+        start = self.folder / START
         if self.recipe.start_from is not None and not (resume and start.is_file()):
             path = training_path(self.recipe.start_from)
             read_beginning(path, self.recipe.training(0).ppo.hidden)
@@ -219,7 +157,7 @@ class _Run:
         """Does the stages of the recipe before; returns False if it was stopped."""
         if self.recipe.before is None:
             return True
-        folder, start = self.folder / BEFORE, self.folder / _START
+        folder, start = self.folder / BEFORE, self.folder / START
         if start.is_file():
             return True
         first = self.recipe.before.read()
@@ -237,18 +175,41 @@ class _Run:
             shutil.copyfile(last / CHECKPOINT, temporary)
         return True
 
+    def make_body(self) -> bool:
+        """Teaches the tokenizer the robot, if need be; returns False if stopped."""
+        robot = get_robot(self.recipe.robot)
+        if self.recipe.body is None or knows(robot):
+            return True
+
+        def report(done: int, total: int) -> None:
+            self.report("motions body", done, total, "")
+
+        made = make_body(
+            robot,
+            self.recipe.body,
+            self.folder / REFERENCES / BODY,
+            self.folder / TOKENIZER,
+            self.recipe.seed,
+            report,
+            self.stop.is_set,
+        )
+        return made is not None
+
     def make_references(self) -> bool:
         """Makes all motions; returns False if it was stopped."""
         robot, sets = get_robot(self.recipe.robot), dict(self.recipe.references)
         if self.recipe.evaluation is not None:
             sets[EVALUATION] = self.recipe.evaluation.motions
+        taught = self.folder / TOKENIZER / "tokenizer.safetensors"
+        own = taught if taught.is_file() else None
         for name, references in sets.items():
 
             def report(done: int, total: int, name: str = name) -> None:
                 self.report(f"motions {name}", done, total, "")
 
             folder = self.folder / REFERENCES / name
-            if not make_references(robot, references, folder, report, self.stop.is_set):
+            stopped = self.stop.is_set
+            if not make_references(robot, references, folder, report, stopped, own):
                 return False
         return True
 
@@ -294,8 +255,8 @@ class _Run:
         if not resume and earlier is not None:
             # Not its policy, which a kill may have left a batch behind.
             first = self.stage_folder(earlier) / CHECKPOINT
-        elif not resume and (self.folder / _START).is_file():
-            first = self.folder / _START
+        elif not resume and (self.folder / START).is_file():
+            first = self.folder / START
 
         before = self._steps_before(index)
 

@@ -28,8 +28,9 @@ from loco_drake.tracking.recipe import (
     Stage,
     read_recipe,
 )
+from loco_drake.tracking.recipe_folder import recipe_curve
 from loco_drake.tracking.recipe_references import make_references
-from loco_drake.tracking.recipe_run import recipe_curve, run_recipe
+from loco_drake.tracking.recipe_run import run_recipe
 from loco_drake.tracking.references import load_references
 from tests.process import LIMIT
 
