@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydrake.common.yaml import yaml_load
 
+from loco_drake.common.errors import InputError
 from loco_drake.models.legged import LeggedRobot
+from loco_drake.motion.conventions import GROUND_MARGIN
 from loco_drake.motion.motion import Motion
 
 if TYPE_CHECKING:
@@ -80,15 +82,32 @@ def _reason(figures: Mapping[str, Any]) -> str:
     return f": joints are as fast as they can be{more}"
 
 
+def check_depth(figures: Mapping[str, Any], robot: LeggedRobot) -> None:
+    """Raises InputError if feet are so deep in the ground that no Motion file may be.
+
+    The reason is told as far as the figures tell it.
+    """
+    depth = figures["penetration_max_m"]
+    if depth > GROUND_MARGIN * robot.stand_height:
+        raise InputError(
+            f"{robot.name} cannot follow: its feet would be {depth * 1000:.3g} mm in "
+            f"the ground{_reason(figures)}."
+        )
+
+
 def judged(motion: Motion, report: Report, robot: LeggedRobot) -> tuple[Motion, Report]:
     """Returns a motion and the report on it, with sentences on what is out of bounds.
 
     The motion's provenance tells the report's main figures, and these sentences.
+
+    Raises:
+        InputError: see :func:`check_depth`.
     """
-    warnings = outside_bounds(asdict(report), robot)
+    check_depth(figures := asdict(report), robot)
+    warnings = outside_bounds(figures, robot)
     kept = ("scale", "toe_error_rmse_m", "correction_rmse_m")
-    figures = {name: f"{getattr(report, name):.6g}" for name in kept}
+    told = {name: f"{figures[name]:.6g}" for name in kept}
     if warnings:
-        figures["warnings"] = "; ".join(warnings)
-    motion = replace(motion, provenance={**motion.provenance, **figures})
+        told["warnings"] = "; ".join(warnings)
+    motion = replace(motion, provenance={**motion.provenance, **told})
     return motion, replace(report, warnings=warnings)

@@ -7,9 +7,10 @@ from math import inf
 import numpy as np
 import pytest
 
+from loco_drake.common.errors import InputError
 from loco_drake.datasets.registry import read_clip
 from loco_drake.models.robots import get_robot, load_robot
-from loco_drake.retargeting.bounds import BOUNDS, outside_bounds
+from loco_drake.retargeting.bounds import BOUNDS, check_depth, outside_bounds
 from loco_drake.retargeting.retarget import retarget_clip
 from tests.robot_files import SOLO8
 from tests.synthetic import write_dog_recording
@@ -62,6 +63,17 @@ def test_toes_that_are_off_since_joints_are_too_slow_say_so(clip):
     ):
         figures |= {"joint_speed_ratio_max": ratio, "scale": scale}
         assert outside_bounds(figures, get_robot("go2")) == (sentence,)
+
+
+def test_a_motion_too_deep_in_the_ground_to_be_read_is_no_motion(clip):
+    """The bound is that of Motion files, a tenth of the robot's height."""
+    robot = get_robot("go2")
+    _, good = retarget_clip(clip, robot)
+    depth = 0.1 * robot.stand_height
+    check_depth(asdict(replace(good, penetration_max_m=depth - 1e-6)), robot)
+    deep = replace(good, penetration_max_m=depth + 1e-3, joint_speed_ratio_max=0.999)
+    with pytest.raises(InputError, match=r"be [\d.]+ mm in the ground: joints are as"):
+        check_depth(asdict(deep), robot)
 
 
 def test_legs_that_cannot_be_put_aside_may_slip(clip):
