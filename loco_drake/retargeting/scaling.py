@@ -49,14 +49,13 @@ from loco_drake.common.rotations import (
 )
 from loco_drake.common.typed import FieldError, convert
 from loco_drake.common.typed_yaml import read_yaml
-from loco_drake.datasets.registry import get_dataset
+from loco_drake.datasets.registry import DATASETS, get_dataset
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion.biped_clip import BipedClip
 from loco_drake.motion.keypoints import KeypointClip
 
 Clip = TypeVar("Clip", KeypointClip, BipedClip)
 
-HUMAN = "human"  # the source of clips of bodies on two legs
 _SOURCES = Path(__file__).parent / "sources"
 
 
@@ -121,7 +120,7 @@ def load_config(source: str) -> RetargetConfig:
         InputError: naming the sources that there are.
     """
     shipped = _SOURCES / f"{source}.yaml"
-    if source == HUMAN:
+    if source not in DATASETS and shipped.is_file():  # a body on two legs
         return read_config(shipped)
     dataset = get_dataset(source)
     own = dataset.config
