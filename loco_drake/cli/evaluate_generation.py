@@ -60,12 +60,12 @@ class EvaluateGeneration(Effort, Evaluation):
         from loco_drake.evaluation.recorded import load_to_score
         from loco_drake.generation.motion_model import load_motion_model
         from loco_drake.models.robots import get_robot
-        from loco_drake.models.shipped import pretrained_path
+        from loco_drake.models.shipped import network_path
 
         robot, say = get_robot(name), say_of(name)
         paths = {
-            "tokenizer": self.tokenizer or pretrained_path("tokenizer"),
-            "generator": self.generator or pretrained_path("generator"),
+            "tokenizer": self.tokenizer or network_path(robot, "tokenizer"),
+            "generator": self.generator or network_path(robot, "generator"),
         }
         labels = self.labels or tuple(map(str, LABELS))
         model = other = None
@@ -84,7 +84,9 @@ class EvaluateGeneration(Effort, Evaluation):
         ground = motions_grounded if model is None else model.grounded
         recorded = self.retarget(robot, ground)
         if model is not None:
-            others = [n for n in model.tokenizer.config.robots if n != name]
+            config = model.tokenizer.config
+            first = config.robots[: len(config.robots) - len(config.added)]
+            others = [n for n in first[::-1] if n != name]
             other = self.retarget(get_robot(others[0]), ground) if others else None
             say(f"Generating {', '.join(map(str, known))}")
             generated = model_figures.generate_for_scoring(

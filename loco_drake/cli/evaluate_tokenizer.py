@@ -30,38 +30,42 @@ class EvaluateTokenizer(Evaluation):
 
     def check(self) -> None:
         """Raises InputError if an option is wrong."""
-        from loco_drake.generation.tokenizer import load_tokenizer
-        from loco_drake.models.shipped import pretrained_path
-
         super().check()
         self._pictures: dict[str, Figure] = {}
-        self._path = self.tokenizer or pretrained_path("tokenizer")
-        self._tokenizer = load_tokenizer(self._path)
-        books = self._tokenizer.config.codebooks
+
+    def of_robot(self, name: str) -> dict[str, Any]:
+        """Returns the figures of one robot."""
+        from loco_drake.evaluation import tokenizer as scores
+        from loco_drake.evaluation.generation_pictures import code_use_figure
+        from loco_drake.generation.tokenizer import load_tokenizer
+        from loco_drake.generation.training_motions import read_training_record
+        from loco_drake.models.robots import get_robot
+        from loco_drake.models.shipped import network_path
+
+        robot = get_robot(name)
+        path = self.tokenizer or network_path(robot, "tokenizer")
+        tokenizer = load_tokenizer(path)
+        books, robots = tokenizer.config.codebooks, tokenizer.config.robots
         if self.books is not None and not 1 <= self.books <= books:
             raise InputError(
                 f"--books must be from 1 to {books}, as many as the tokenizer has, "
                 f"not {self.books}."
             )
-
-    def of_robot(self, name: str) -> dict[str, Any]:
-        """Returns the figures of one robot."""
-        from loco_drake.evaluation.generation_pictures import code_use_figure
-        from loco_drake.evaluation.tokenizer import evaluate_tokenizer
-        from loco_drake.generation.training_motions import read_training_record
-        from loco_drake.models.robots import get_robot
-
-        robots = self._tokenizer.config.robots
         if name not in robots:
             raise InputError(
                 f"The tokenizer's weights are not for the robot {name!r}; they are "
                 f"for {', '.join(robots)}."
             )
-        record = read_training_record(self._path, "tokenizer") or {}
+        record = read_training_record(path, "tokenizer") or {}
         grounded = bool(record.get("grounded", False))
-        recorded = self.retarget(get_robot(name), grounded)
-        seen = trained_on({"tokenizer": self._path}, recorded, name)
-        figures, counts = evaluate_tokenizer(self._tokenizer, recorded, self.books)
+        recorded = self.retarget(robot, grounded)
+        seen = trained_on({"tokenizer": path}, recorded, name)
+        figures, counts = scores.evaluate_tokenizer(tokenizer, recorded, self.books)
+        if name in tokenizer.config.added:
+            given = self.retarget(get_robot(scores.KNOWN), grounded)
+            pairs = scores.pair_up(given.validation, recorded.validation)
+            apart = scores.transfer_rmse(tokenizer, pairs) if pairs else None
+            figures["transfer_joint_rmse_rad"] = apart
         if self.figures is not None:
             title = f"{name}: {figures['codebook_use']:.0%} of the codes are used"
             self._pictures[name] = code_use_figure(counts, title)
@@ -81,4 +85,9 @@ class EvaluateTokenizer(Evaluation):
             print_failed([(name, figures["reason"])])
         else:
             print_report(tokenizer_table(name, Figures(figures)))
+        if (apart := figures.get("transfer_joint_rmse_rad")) is not None:
+            print(
+                f"The Go2's tokens, decoded for {name}: {apart:.4f} rad from what is "
+                "retargeted to it, held out."
+            )
         return 0

@@ -103,11 +103,21 @@ def add_model_figures(
     if other_robot is None:
         robots = ", ".join(model.tokenizer.config.robots)
         reasons["transfer_joint_rmse_rad"] = f"The tokenizer knows only {robots}."
-    elif pairs := pair_up(recorded.validation, other_robot.validation):
+    elif pairs := _pairs(model, recorded, other_robot):
         figures["transfer_joint_rmse_rad"] = transfer_rmse(model.tokenizer, pairs)
         del reasons["transfer_joint_rmse_rad"]
     else:
         reasons["transfer_joint_rmse_rad"] = "No recording is held out."
+
+
+def _pairs(
+    model: MotionModel, recorded: Recorded, other: Recorded
+) -> list[tuple[Motion, Motion]]:
+    """Returns what to decode for the other robot; for a robot that was added, its."""
+    sides = recorded.validation, other.validation
+    if model.robot.name in model.tokenizer.config.added:
+        sides = sides[::-1]
+    return pair_up(*sides)
 
 
 def real_time_factor(model: MotionModel, label: GaitLabel) -> float:

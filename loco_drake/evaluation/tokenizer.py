@@ -31,6 +31,7 @@ from loco_drake.motion.gaits import LABELS
 from loco_drake.motion.motion import Motion
 
 FIGURES = ("joint_rmse_rad", "toe_error_rmse_m")
+KNOWN = "go2"  # whose tokens are decoded for robots that were added
 NO_RECORDINGS = "No recording of this label is held out."
 
 

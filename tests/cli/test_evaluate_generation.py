@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from loco_drake.cli.evaluate_generation import EvaluateGeneration
 from loco_drake.cli.evaluate_tokenizer import EvaluateTokenizer
@@ -13,8 +14,10 @@ from loco_drake.common.errors import InputError
 from loco_drake.common.weights import save_network
 from loco_drake.evaluation.classifier import load_classifier
 from loco_drake.evaluation.recorded import retarget_recordings
+from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import save_motion
+from tests.robot_files import OWN
 from tests.synthetic import write_dog_recording
 from tests.synthetic_motion import synthetic_motion
 from tests.tiny_model import make_tiny_model
@@ -293,6 +296,25 @@ def test_books_of_the_tokenizer_evaluation(recordings, weights):
     )
     with pytest.raises(InputError, match="--books must be from 1 to 2"):
         command.run()
+
+
+def test_a_robot_that_was_added_is_told_how_the_go2s_tokens_fit(
+    recordings, tmp_path, capsys
+):
+    """Go2's tokens are decoded for it, and compared with its own motion."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(0)
+        config = TokenizerConfig(robots=("go2", "b1"), added=("b1",), bodies=("b1",))
+        tokenizer = Tokenizer(config)
+    path, file = tmp_path / "tokenizer.safetensors", tmp_path / "a.json"
+    save_network(path, "tokenizer", tokenizer)
+    options = {"data_dir": recordings, "tokenizer": path, "json": file}
+    assert EvaluateTokenizer(robot=str(OWN["b1"]), **options).run() == 0
+    figures = json.loads(file.read_text())
+    assert figures["transfer_joint_rmse_rad"] > 0.1
+    assert "The Go2's tokens, decoded for b1" in capsys.readouterr().out
+    assert EvaluateTokenizer(robot="go2", **options).run() == 0
+    assert "transfer_joint_rmse_rad" not in json.loads(file.read_text())
 
 
 def test_both_sides_of_the_split_are_there(recorded):

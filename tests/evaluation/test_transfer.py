@@ -8,6 +8,7 @@ from loco_drake.evaluation.tokenizer import pair_up, transfer_rmse
 from loco_drake.generation.features import JOINTS, motion_features
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig
 from loco_drake.models.robots import get_robot
+from tests.robot_files import OWN
 from tests.synthetic_motion import synthetic_motion
 
 
@@ -40,6 +41,30 @@ def test_what_the_other_robot_would_do_is_compared(tokenizer):
     assert transfer_rmse(tokenizer, [off]) == pytest.approx(0.05, rel=1e-4)
     mean = np.sqrt(0.05**2 / 2)
     assert transfer_rmse(tokenizer, [pair, off]) == pytest.approx(mean, rel=1e-4)
+
+
+def test_joints_of_another_build_are_compared_as_its_own():
+    """ANYmal's rear knees point forward: what is decoded are legs as the Go2's."""
+    robot = get_robot(str(OWN["anymal"]))
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(0)
+        config = TokenizerConfig(
+            robots=("go2", "anymal"), added=("anymal",), bodies=("anymal",), width=16
+        )
+        tokenizer = Tokenizer(config)
+        tokenizer.codebooks.normal_()
+    motion = synthetic_motion(seconds=2.0, name="go2")
+    features = motion_features(get_robot("go2"), motion)[None, :100]
+    with torch.inference_mode():
+        given = torch.tensor(features, dtype=torch.float32)
+        codes = tokenizer.encode(given, torch.tensor([0]))
+        angles = tokenizer.decode(codes, torch.tensor([1]))[0, :, JOINTS].numpy()
+    other = synthetic_motion(seconds=2.0, name="anymal")
+    joints = other.joint_positions.copy()
+    joints[:100] = robot.joints_of_backward(angles)
+    assert np.abs(joints[:100] - angles).max() > 0.5
+    pair = (motion, replace(other, joint_positions=joints))
+    assert transfer_rmse(tokenizer, [pair]) == pytest.approx(0.0, abs=1e-5)
 
 
 def test_pairs_are_of_the_same_stretch():
