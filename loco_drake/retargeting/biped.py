@@ -26,15 +26,13 @@ from loco_drake.retargeting.biped_scaling import (
 from loco_drake.retargeting.bounds import judged
 from loco_drake.retargeting.contacts import (
     UPRIGHT,
-    detect_contacts,
-    resample_contacts,
 )
 from loco_drake.retargeting.inverse_kinematics import Linkage, PointSolver, Solution
+from loco_drake.retargeting.preparation import prepare
 from loco_drake.retargeting.scaling import (
     AS_RECORDED,
     RetargetConfig,
     Variant,
-    in_time,
     load_config,
     resample_points,
     smoothing_in_time,
@@ -123,15 +121,10 @@ def retarget_biped(
     solver = solver or BipedSolver(robot, FPS)
     clip = clip.mirrored() if variant.mirror else clip
     height = config.stance_height or float(np.median(clip.middle[:, 2]))
-    scale = robot.hip_height / height
-    raw_contacts = detect_contacts(clip, height, config.contact)
-    time_scale = variant.time_scale(scale)
-    timed = in_time(clip, time_scale)
-    resampled = resample_biped(timed, FPS)
-    formula = scale_to_biped(resampled, height, robot, config)
-    contacts = resample_contacts(raw_contacts, timed.fps, FPS, len(resampled))
-    config = smoothing_in_time(config, time_scale)
-    targets, (joints, solved) = follow(formula, contacts, solver, config)
+    ready = prepare(clip, height, robot.hip_height, config, variant, resample_biped)
+    formula = scale_to_biped(ready.clip, height, robot, config)
+    config = smoothing_in_time(config, ready.time_scale)
+    targets, (joints, solved) = follow(formula, ready.contacts, solver, config)
     motion = make_motion(
         robot=robot.name,
         label=GaitLabel(clip.source, clip.gait),
@@ -139,8 +132,8 @@ def retarget_biped(
         base_position=targets.p_WB,
         base_quaternion=targets.q_WB,
         joint_positions=joints,
-        contacts=contacts,
-        provenance=timed.provenance,
+        contacts=ready.contacts,
+        provenance=ready.clip.provenance,
     )
     seconds = time.perf_counter() - began
     p_WF = quality.toe_trajectories(motion, robot)
@@ -160,8 +153,8 @@ def retarget_biped(
         joint_limit_violations=quality.joint_limit_violations(joints, robot),
         joint_limit_margin_rad=float(margins.min()),
         joint_speed_ratio_max=quality.joint_speed_ratio_max(joints, robot, FPS),
-        scale=scale,
-        time_scale=time_scale,
+        scale=ready.scale,
+        time_scale=ready.time_scale,
         mirrored=variant.mirror,
         on_feet_share=float(on_feet(clip).mean()),
         feet_apart_min_m=float(

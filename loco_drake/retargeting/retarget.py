@@ -25,10 +25,8 @@ from loco_drake.motion.motion import FPS, Motion, make_motion
 from loco_drake.motion.motion_file import motion_bytes, write_motion
 from loco_drake.retargeting.bounds import judged
 from loco_drake.retargeting.contacts import (
-    detect_contacts,
     frames_on_feet,
     on_feet,
-    resample_contacts,
     stance_height,
     track_width,
 )
@@ -36,12 +34,12 @@ from loco_drake.retargeting.correction import correct
 from loco_drake.retargeting.grounding import ground
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.journal import Journal
+from loco_drake.retargeting.preparation import prepare
 from loco_drake.retargeting.report import RetargetReport
 from loco_drake.retargeting.scaling import (
     AS_RECORDED,
     RetargetConfig,
     Variant,
-    in_time,
     load_config,
     resample,
     scale_to_robot,
@@ -72,15 +70,15 @@ def retarget_clip(
     config = config or load_config(clip.source)
     solver = solver or LegSolver(robot, FPS)
     clip = clip.mirrored() if variant.mirror else clip
+    if contacts is not None and variant.mirror:
+        contacts = contacts[:, MIRROR_LEGS]
     height = stance_height(clip, config)
-    scale = robot.stand_height / height
-    raw_contacts = _contacts(clip, height, config, contacts, variant)
-    time_scale = variant.time_scale(scale)
-    timed = in_time(clip, time_scale)
-    resampled = resample(timed, FPS)
-    formula = scale_to_robot(resampled, height, robot, config)
-    contacts = resample_contacts(raw_contacts, timed.fps, FPS, len(resampled))
-    targets = correct(formula, contacts, robot, smoothing_in_time(config, time_scale))
+    ready = prepare(
+        clip, height, robot.stand_height, config, variant, resample, contacts
+    )
+    formula = scale_to_robot(ready.clip, height, robot, config)
+    smoothing = smoothing_in_time(config, ready.time_scale)
+    targets = correct(formula, ready.contacts, robot, smoothing)
     joints, solved = solver.solve(targets.p_BF)
     motion = make_motion(
         robot=robot.name,
@@ -89,8 +87,8 @@ def retarget_clip(
         base_position=targets.p_WB,
         base_quaternion=targets.q_WB,
         joint_positions=joints,
-        contacts=contacts,
-        provenance=timed.provenance,
+        contacts=ready.contacts,
+        provenance=ready.clip.provenance,
     )
     grounding = None
     if variant.ground:
@@ -114,8 +112,8 @@ def retarget_clip(
         joint_speed_ratio_max=quality.joint_speed_ratio_max(
             motion.joint_positions, robot, FPS
         ),
-        scale=scale,
-        time_scale=time_scale,
+        scale=ready.scale,
+        time_scale=ready.time_scale,
         mirrored=variant.mirror,
         on_feet_share=None if standing is None else float(standing.mean()),
         on_feet_frames=None if standing is None else frames_on_feet(clip, standing),
@@ -126,19 +124,6 @@ def retarget_clip(
         grounding=grounding,
     )
     return judged(motion, report, robot)
-
-
-def _contacts(
-    clip: KeypointClip,
-    height: float,
-    config: RetargetConfig,
-    known: Bools | None,
-    variant: Variant,
-) -> Bools:
-    """Returns the contacts of a clip, which is mirrored already, unlike ``known``."""
-    if known is None:
-        return detect_contacts(clip, height, config.contact)
-    return known[:, MIRROR_LEGS] if variant.mirror else known
 
 
 @dataclass(frozen=True)
