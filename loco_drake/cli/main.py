@@ -1,6 +1,5 @@
 """The entry point of ``loco-drake``."""
 
-import logging
 import sys
 from importlib import import_module
 from typing import Any
@@ -13,6 +12,7 @@ from loco_drake.cli.options import Output, outputs
 from loco_drake.cli.output import check_output
 from loco_drake.cli.parsing import parse
 from loco_drake.common.determinism import use_one_thread
+from loco_drake.common.drake_log import quiet_drake
 from loco_drake.common.errors import InputError, check_choice, one_line
 
 # What each command does.
@@ -107,9 +107,7 @@ def _run(arguments: list[str]) -> int:
     check_choice("command", name, members or _COMMANDS)
     use_one_thread()
     command = command_class(name)
-    # Lower levels tell of harmless properties of models. Importing Drake resets the
-    # level, but no filter.
-    logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.ERROR)
+    quiet_drake()
     parsed: Any = parse(command, name, rest)
     for option, kind in outputs(command).items():
         check_output(getattr(parsed, option), folder=kind is Output.FOLDER)

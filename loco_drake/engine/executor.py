@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from loco_drake.common.determinism import use_one_thread
+from loco_drake.common.drake_log import quiet_drake
 from loco_drake.common.errors import check_at_least
 
 Item = TypeVar("Item")
@@ -89,6 +90,7 @@ class Function:
 
     def __init__(self, make: Callable[[], Callable[[Any], Any]]) -> None:
         use_one_thread()
+        quiet_drake()
         self._error: Exception | None = None
         try:
             self._function = make()
