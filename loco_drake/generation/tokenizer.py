@@ -89,6 +89,7 @@ class BodyLayers(nn.Module):
         super().__init__()
         frames = config.frames_per_token
         self.encoder_in = nn.Linear(SIZE * frames, config.width)
+        self.decoder_in = nn.Linear(config.code_size, config.width)
         self.expand = nn.Linear(config.width, frames * config.frame_width)
         self.decoder_out = nn.Linear(config.frame_width, SIZE)
 
@@ -181,7 +182,8 @@ class Tokenizer(nn.Module):
 
     def decode_embedded(self, embedded: Tensor, robot: Tensor) -> Tensor:
         """Decodes vectors (B, n, code_size); contacts are logits."""
-        x = self.decoder_in(embedded) + self.decoder_robot(robot)[:, None]
+        x = self._by_body("decoder_in", embedded, robot)
+        x = x + self.decoder_robot(robot)[:, None]
         # (B, n, frames * frame_width)
         x = self._by_body("expand", self.decoder(x), robot)
         x = x.view(x.shape[0], -1, self.config.frame_width)

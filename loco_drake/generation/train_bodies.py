@@ -20,7 +20,6 @@ from loco_drake.common.device import find_device
 from loco_drake.common.errors import InputError
 from loco_drake.common.weights import save_network
 from loco_drake.generation.loop_settings import LoopSettings
-from loco_drake.generation.point_masses import PointMasses
 from loco_drake.generation.tokenizer import (
     BODY_ROWS,
     BodyLayers,
@@ -41,6 +40,11 @@ from loco_drake.generation.training_motions import (
     training_record,
 )
 from loco_drake.generation.windows import PairedWindows, long_enough
+
+# What a robot's own motion is like counts most. Momentum is not asked for: what the
+# codes lack of it, a body cannot give, and would leave its own motion for.
+_WEIGHTS = {name: WEIGHTS[name] for name in WEIGHTS if name != "momentum"}
+_WEIGHTS["features"] = 4.0
 
 
 class _Rows(nn.Module):
@@ -96,21 +100,21 @@ def train_bodies(
     device = find_device(settings.device)
     grown.to(device)
     robots = grown.config.robots
-    toes, masses = Toes(robots, device), PointMasses(robots, device)
+    toes = Toes(robots, device)
     windows, scales = PairedWindows(clips, robots), Scales(clips, device)
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         target, robot, label = (x.to(device) for x in windows(random, BATCH))
         losses = tokenizer_losses(
-            _Held(grown), toes, masses, scales(label), target, robot
+            _Held(grown), toes, None, scales(label), target, robot
         )
-        weighted = (WEIGHTS[name] * loss for name, loss in losses.items())
+        weighted = (_WEIGHTS[name] * loss for name, loss in losses.items())
         total = sum(weighted, torch.zeros((), device=device))
         return total, {name: loss.item() for name, loss in losses.items()}
 
     run = {
         "network": asdict(grown.config),
-        "weights": WEIGHTS,
+        "weights": _WEIGHTS,
         "motions": library.summary,
         "base": base.fingerprint,
     }

@@ -225,7 +225,7 @@ def train_tokenizer(
 def tokenizer_losses(
     learning: Callable[[Tensor, Tensor, Tensor], tuple[Tensor, Tensor]],
     toes: Toes,
-    masses: PointMasses,
+    masses: PointMasses | None,
     scales: tuple[Tensor, Tensor, Tensor],
     target: Tensor,
     robot: Tensor,
@@ -236,7 +236,7 @@ def tokenizer_losses(
         learning: returns reconstructions and the commitment loss, see
             :class:`LearningTokenizer`, whose codebooks are updated in training mode.
         toes: of the tokenizer's robots.
-        masses: of the tokenizer's robots.
+        masses: of the tokenizer's robots; None to leave out momentum.
         scales: of the windows, see :class:`Scales`.
         target: features, shape (N, T, SIZE). The first BATCH windows are encoded, and
             all are to be decoded from their tokens, see :class:`PairedWindows`.
@@ -250,9 +250,11 @@ def tokenizer_losses(
     p_output = toes.positions(output, robot)
     v_target = toes.velocities(target, p_target, robot)
     v_output = toes.velocities(output, p_output, robot)
-    # Half of the windows are enough, at half the time.
-    half = (x[::2] for x in (output, target, p_target, robot))
-    missing = masses.unexplained(*half)
+    momentum = {}
+    if masses is not None:
+        # Half of the windows are enough, at half the time.
+        half = (x[::2] for x in (output, target, p_target, robot))
+        momentum["momentum"] = masses.unexplained(*half).mean() / MOMENTUM_SCALE**2
     return {
         "features": (error / deviation).square().mean(),
         "changes": (error.diff(dim=1) / change).square().mean(),
@@ -260,7 +262,7 @@ def tokenizer_losses(
         "energy": energy_error(output, target, jitter),
         "toes": ((p_output - p_target) / TOE_SCALE).square().mean(),
         "toe_speeds": ((v_output - v_target) / TOE_SPEED_SCALE).square().mean(),
-        "momentum": missing.mean() / MOMENTUM_SCALE**2,
+        **momentum,
         "contacts": functional.binary_cross_entropy_with_logits(
             contacts, target[..., CONTACTS]
         ),

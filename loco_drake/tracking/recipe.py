@@ -110,7 +110,7 @@ class Body:
         default_factory=lambda: ReferenceSet(count=8, first_seed=3000)
     )
     # Steps of the tokenizer's training.
-    steps: int = 5000
+    steps: int = 3000
 
     def check(self) -> None:
         """Raises InputError unless it can be done."""
