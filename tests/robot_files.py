@@ -7,6 +7,16 @@ SOLO8 = ROOT / "examples" / "solo8.yaml"
 # Those that can be simulated.
 OWN = {name: ROOT / "examples" / f"{name}.yaml" for name in ("b1", "anymal")}
 
+
+def without_weights(name: str, folder: Path) -> Path:
+    """Writes the file of one of OWN as if it came without weights; returns its path."""
+    lines = OWN[name].read_text().splitlines()
+    path = folder / f"{name}.yaml"
+    text = "\n".join(line for line in lines if not line.startswith("weights:"))
+    path.write_text(text + "\n")
+    return path
+
+
 _DATA = "package://example-robot-data/robots"
 _LEGS = ("FL", "FR", "RL", "RR")
 

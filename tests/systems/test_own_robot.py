@@ -19,7 +19,7 @@ from loco_drake.systems.diagram import MakeLocomotionDiagram
 from loco_drake.systems.scenario import ExternalAction, MotionReference, Scenario
 from loco_drake.systems.simulator import StartEpisode
 from tests.retargeting.test_other_robot import dog_clip
-from tests.robot_files import OWN
+from tests.robot_files import OWN, without_weights
 
 
 @pytest.fixture(scope="module", params=tuple(OWN))
@@ -102,15 +102,19 @@ def test_a_tracker_is_trained_simulated_and_exported(robot, folder, tmp_path, ca
     assert main(["export", *options.split()]) == 0
     assert (tmp_path / "policy.onnx").is_file()
     capsys.readouterr()
-    options = f"--robot {name} --reference {folder / 'trot.npz'} --no-meshcat"
+    bare = without_weights(robot.name, tmp_path)
+    options = f"--robot {bare} --reference {folder / 'trot.npz'} --no-meshcat"
     assert main(["simulate", *options.split()]) == 2
     said = capsys.readouterr().err
     assert f"There are no policy weights for {robot.name} yet" in said
     assert "loco-drake train tracker" in said
 
 
-def test_generated_motion_needs_a_tokenizer_that_knows_the_body(robot, capsys):
-    assert main(["generate", "--robot", robot.definition]) == 2
+def test_generated_motion_needs_a_tokenizer_that_knows_the_body(
+    robot, capsys, tmp_path
+):
+    bare = without_weights(robot.name, tmp_path)
+    assert main(["generate", "--robot", str(bare)]) == 2
     said = capsys.readouterr().err
     assert f"not for the robot '{robot.name}'" in said
     assert "loco-drake train tokenizer --add-to" in said

@@ -15,21 +15,26 @@ from loco_drake.motion.motion_file import load_motion
 from loco_drake.tracking.recipe import Body, Recipe, ReferenceSet, Stage
 from loco_drake.tracking.recipe_body import knows, make_body
 from loco_drake.tracking.recipe_run import run_recipe
-from tests.robot_files import OWN
+from tests.robot_files import without_weights
 
 pytestmark = pytest.mark.slow
 
-ANYMAL = OWN["anymal"]
 LABELS = ["dog-trot", "horse-walk"]
 BODY = Body(motions=ReferenceSet(labels=LABELS, count=1, seconds=2.0), steps=3)
 
 
 @pytest.fixture(scope="module")
-def ended(tmp_path_factory):
+def anymal(tmp_path_factory):
+    """The file of a robot that no weights know."""
+    return str(without_weights("anymal", tmp_path_factory.mktemp("robot")))
+
+
+@pytest.fixture(scope="module")
+def ended(anymal, tmp_path_factory):
     """The run of a recipe for ANYmal."""
     one = ReferenceSet(labels=["dog-trot"], count=1, seconds=2.0)
     recipe = Recipe(
-        robot=str(ANYMAL),
+        robot=anymal,
         environments=2,
         body=BODY,
         references={"one": one},
@@ -42,14 +47,14 @@ def ended(tmp_path_factory):
     return folder
 
 
-def test_the_run_has_all_that_the_robot_needs(ended):
+def test_the_run_has_all_that_the_robot_needs(anymal, ended):
     """Its tokenizer and its policy are found, and go with the shipped generator."""
-    robot = get_robot(str(ANYMAL))
+    robot = get_robot(anymal)
     found = weights_in(ended)
     assert found["tokenizer"] == ended / "tokenizer" / "tokenizer.safetensors"
     assert found["policy"] == ended / "policy.safetensors"
     assert load_actor(found["policy"], robot)
-    model = motion_model_of(str(ANYMAL), tokenizer=found["tokenizer"])
+    model = motion_model_of(anymal, tokenizer=found["tokenizer"])
     shipped = load_tokenizer(pretrained_path("tokenizer"))
     assert model.tokenizer.fingerprint == shipped.fingerprint
     made = load_motion(ended / "references" / "one" / "dog-trot-1000.npz")
@@ -75,8 +80,8 @@ def test_motions_of_both_robots_belong_together(ended):
         assert next(travelled) / next(travelled) == pytest.approx(scale, rel=0.1)
 
 
-def test_it_goes_on_where_it_was_stopped(tmp_path):
-    robot = get_robot(str(ANYMAL))
+def test_it_goes_on_where_it_was_stopped(anymal, tmp_path):
+    robot = get_robot(anymal)
     assert not knows(robot)
     motions, out = tmp_path / "motions", tmp_path / "tokenizer"
     asked = iter([False, True])
