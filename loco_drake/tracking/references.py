@@ -9,14 +9,20 @@ from loco_drake.control.plan import Plan, plan_from_motion
 from loco_drake.control.retiming import fall_limit, path_limits, smooth_plan
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
-from loco_drake.models.robots import Robot
+from loco_drake.models.legged import LeggedRobot
+from loco_drake.models.robots import Robot, SimulatedRobot
 from loco_drake.motion.gaits import parse_label
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.motion_folder import open_motions
 
 
-def smooth_motions(robot: Robot, motions: Iterable[Motion]) -> list[Plan]:
-    """Returns motions as plans, re-timed by the smoother."""
+def smooth_motions(robot: SimulatedRobot, motions: Iterable[Motion]) -> list[Plan]:
+    """Returns motions as plans, re-timed by the smoother.
+
+    It is for robots with three joints a leg; others follow motion at its own time.
+    """
+    if not isinstance(robot, Robot):
+        return [plan_from_motion(robot, motion) for motion in motions]
     limits = {
         grounded: path_limits(robot, fall_limit(grounded)) for grounded in (False, True)
     }
@@ -26,7 +32,7 @@ def smooth_motions(robot: Robot, motions: Iterable[Motion]) -> list[Plan]:
     ]
 
 
-def read_motions(robot: Robot, folder: Path) -> dict[Path, Motion]:
+def read_motions(robot: LeggedRobot, folder: Path) -> dict[Path, Motion]:
     """Returns the motions in ``folder``, packed or not, by file.
 
     Raises:
@@ -48,8 +54,8 @@ def read_motions(robot: Robot, folder: Path) -> dict[Path, Motion]:
     return motions
 
 
-def load_references(robot: Robot, folder: Path) -> list[Plan]:
-    """Returns the Motion files in ``folder`` as plans, re-timed by the smoother.
+def load_references(robot: SimulatedRobot, folder: Path) -> list[Plan]:
+    """Returns the Motion files in ``folder`` as plans, see :func:`smooth_motions`.
 
     Raises:
         InputError: as :func:`read_motions`.
