@@ -39,8 +39,9 @@ class Mirror:
     """Mirrors arrays and tensors by permuting the last axis and changing signs."""
 
     def __init__(self, order: Integers, signs: Array) -> None:
-        self._order, self._signs = order, signs
-        self._signs_torch = torch.tensor(signs, dtype=torch.float32)
+        # Copies, since torch takes no array that cannot be written.
+        self._order, self._signs = order.copy(), signs.copy()
+        self._signs_torch = torch.tensor(self._signs, dtype=torch.float32)
 
     def __call__(self, values: Values) -> Values:
         """Returns the mirror image of ``values``, of the same shape (..., N)."""
