@@ -1,7 +1,7 @@
 """Plans for training a tracker, smoothed in advance."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from loco_drake.common.errors import InputError, quoted
@@ -48,10 +48,15 @@ def read_motions(robot: LeggedRobot, folder: Path) -> dict[Path, Motion]:
         raise InputError(
             f"There are {count} motions called {quoted(name)} in {str(folder)!r}."
         )
+    check_robot(robot, motions)
+    return motions
+
+
+def check_robot(robot: LeggedRobot, motions: Mapping[Path, Motion]) -> None:
+    """Raises InputError unless all motions, by file, are of a robot."""
     for path, motion in motions.items():
         if motion.robot != robot.name:
             raise InputError(f"{path} is of {motion.robot}, not of {robot.name}.")
-    return motions
 
 
 def load_references(robot: SimulatedRobot, folder: Path) -> list[Plan]:
