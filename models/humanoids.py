@@ -87,14 +87,15 @@ def _make(robot: Biped, file: BipedFile, root: ET.Element) -> Humanoid:
     for name, value in zip(names, effort, strict=True):
         if not 0 < value < np.inf:
             raise InputError(f"The URDF has no torque limit of {name}.")
-    axes, origins = _joint_axes(robot)
-    mirror, signs = _mirror(robot, axes, origins)
     rotors = ROTOR_SHARE * effort**2
     kp = effort / own.give
     limits = robot.joint_lower, robot.joint_upper, robot.joint_speed_limits
     # The damping follows from inertias, which do not depend on it.
     bare = Motors(*limits, effort, rotors, kp, np.ones_like(kp))
     plant = _plant(_write(root, robot, bare, own.foot_friction, 1.0))
+    _check_order(plant, robot)
+    axes, origins = _joint_axes(plant, robot)
+    mirror, signs = _mirror(robot, axes, origins)
     context = plant.CreateDefaultContext()
     plant.SetPositions(context, [1.0, *[0.0] * 6, *robot.stand_joints])
     M = plant.CalcMassMatrix(context)
@@ -159,11 +160,24 @@ def _plant(text: str) -> MultibodyPlant:
     return plant
 
 
-def _joint_axes(robot: Biped) -> tuple[Array, Array]:
+def _check_order(plant: MultibodyPlant, robot: Biped) -> None:
+    """Raises InputError unless states are [q, v] of the trunk, then of the joints."""
+    trunk = plant.GetFrameByName(robot.trunk_frame)
+    (root,) = plant.GetFloatingBaseBodies()
+    if not (trunk.is_body_frame() and trunk.body().index() == root):
+        raise InputError(
+            "To be simulated the trunk must be the root of the URDF, not "
+            f"{trunk.name()}."
+        )
+    starts = [plant.GetJointByName(n).position_start() for n in robot.joint_names]
+    if starts != list(range(7, 7 + len(starts))):
+        raise InputError(
+            "To be simulated joints must be named limb by limb, from the trunk outward."
+        )
+
+
+def _joint_axes(plant: MultibodyPlant, robot: Biped) -> tuple[Array, Array]:
     """Returns axes and origins of all joints in B, all joints at zero, (J, 3) each."""
-    plant = MultibodyPlant(time_step=0.0)
-    robot.AddModel(Parser(plant))
-    plant.Finalize()
     context = plant.CreateDefaultContext()
     base = plant.GetFrameByName(robot.trunk_frame)
     axes, origins = [], []

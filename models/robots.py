@@ -15,7 +15,7 @@ from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, check_choice, quoted
 
 from .biped_file import BIPEDS, is_biped_file, read_biped
-from .humanoids import read_humanoid
+from .humanoids import humanoid_settings, read_humanoid
 from .legged import LeggedRobot
 from .legs import LEGS
 from .own_robots import Setting, read_own_robot
@@ -124,8 +124,10 @@ def robot_settings(path: Path) -> tuple[Setting, ...]:
     """Returns what the robot in a YAML file is simulated with, each with its source.
 
     Raises:
-        InputError: as :func:`get_robot`.
+        InputError: as :func:`get_simulated`.
     """
+    if is_biped_file(str(path)):
+        return humanoid_settings(str(path))
     return _read_file(path.resolve())[1]
 
 

@@ -9,10 +9,8 @@ from loco_drake.common.errors import InputError
 if TYPE_CHECKING:
     from .simulated import SimulatedRobot
 
-_HOW_TO_TRAIN = (
-    " Train one with loco-drake train tracker, and give it with --policy, or name its "
-    "folder as weights in the robot's file."
-)
+_HOW_TO_TRAIN = " Train one with loco-drake train tracker, and give it with --policy"
+_OR_NAME_IT = ", or name its folder as weights in the robot's file."
 
 
 def pretrained_dir() -> Path:
@@ -119,14 +117,15 @@ def policy_path(robot: "SimulatedRobot", policy: Path | None = None) -> Path:
         shipped = pretrained_path(f"policy_{robot.name}")
         main = own_weights(robot).get("policy", shipped)
         if not main.is_file():
+            from .biped import Biped
             from .robots import ROBOTS
 
+            how = "" if robot.name in ROBOTS else _HOW_TO_TRAIN
+            how += "." if isinstance(robot, Biped) else _OR_NAME_IT * bool(how)
             present = [n for n in ROBOTS if pretrained_path(f"policy_{n}").is_file()]
             raise InputError(
                 f"There are no policy weights for {robot.name} yet; "
-                f"there are some for {', '.join(present) or 'no robot'}."
-                + _HOW_TO_TRAIN
-                * (robot.name not in ROBOTS)
+                f"there are some for {', '.join(present) or 'no robot'}." + how
             )
         return main
     if policy.name != str(policy) or policy.suffix or policy.exists():

@@ -200,7 +200,7 @@ class Simulate:
             InputError: if an option or a field of the scenario is amiss.
         """
         from loco_drake.control.driving import check_command
-        from loco_drake.models.robots import get_simulated
+        from loco_drake.models.robots import Robot, get_simulated
         from loco_drake.systems.scenario import (
             GeneratedReference,
             LoadScenario,
@@ -240,6 +240,8 @@ class Simulate:
         scenario.check()
         if self.command is not None:
             check_command(self.command)
+            if not isinstance(get_simulated(scenario.robot), Robot):
+                raise InputError("--command is for robots with three joints a leg.")
             if scenario.steering is None:
                 raise InputError("--command needs a scenario with steering.")
         if not isinstance(scenario.policy, TrainedPolicy):
