@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from loco_drake.cli.evaluation import SimulatedEvaluation, print_by_label
 from loco_drake.cli.options import Policy, TrainedLabels, option
 from loco_drake.cli.output import tracked
-from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.errors import InputError, check_choice, quoted
 from loco_drake.motion.gaits import any_label, parse_label
 from loco_drake.tracking.randomization import RandomizationConfig
 
@@ -69,9 +69,12 @@ class EvaluateTracking(SimulatedEvaluation):
         from loco_drake.generation.generate import check_duration
 
         super().check()
-        if not self._of_files:
-            check_choice("reference", self.reference, _REFERENCES)
-        elif self.labels:
+        if self.reference not in _REFERENCES and not self._of_files:
+            raise InputError(
+                f"Unknown reference {quoted(self.reference)}; the choices are "
+                f"{', '.join(_REFERENCES)}, a Motion file or a folder of them."
+            )
+        if self._of_files and self.labels:
             raise InputError("--labels are not of Motion files, which have their own.")
         check_choice("simulator", self.simulator, ("drake", "mujoco"))
         check_duration(self.duration)
