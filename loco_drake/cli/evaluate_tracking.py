@@ -158,9 +158,12 @@ class EvaluateTracking(SimulatedEvaluation):
         scenario = systems.Scenario(robot=robot.definition, plant=plant, policy=policy)
         if self._of_files:
             scenario.reference = systems.PlanReference()
-            return scenario, tracking_table.motion_trials(
+            trials = tracking_table.motion_trials(
                 robot, Path(self.reference), self.seeds, self.duration
             )
+            grounded = fall_limit(all(trial.ground for trial in trials))
+            scenario.smoother = systems.SmootherConfig(fall=grounded)
+            return scenario, trials
         if self.reference != "generated":
             ground = self.reference == "grounded"
             scenario.reference = systems.PlanReference()

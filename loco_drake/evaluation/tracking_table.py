@@ -205,9 +205,12 @@ def motion_trials(
         last = len(motion) - 1 - round(duration / PLAN_DT)
         last = last if last >= 0 else (len(motion) - 1) // 2
         starts = np.linspace(0, last, count + 1)[:count].round().astype(int)
+        same = Trial(
+            str(motion.label), 0, duration, ground=motion.grounded, motion=path
+        )
         trials += [
-            Trial(str(motion.label), k, duration, motion=path, start=int(start))
-            for k, start in enumerate(starts)
+            replace(same, seed=seed, start=int(start))
+            for seed, start in enumerate(starts)
         ]
     return trials
 
