@@ -49,7 +49,8 @@ _GENERATED = ("generated", "gpt")  # the latter formerly
 class Simulate:
     """Simulate a robot in Drake that tracks generated motion or a Motion file."""
 
-    # Robot: go2, a1, g1, or a YAML file, see docs/own_robot.md and docs/humanoid.md.
+    # Robot: go2, a1, or a YAML file, see docs/own_robot.md; or g1, see
+    # docs/humanoid.md.
     robot: Annotated[str | None, option(metavar="ROBOT|FILE", default="go2")] = None
     gait: Annotated[
         str | None,

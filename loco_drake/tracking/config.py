@@ -60,7 +60,8 @@ class ResetNoise:
 class EnvironmentConfig:
     """Configuration of an environment, without its plans."""
 
-    # Robot: go2, a1, g1, or a YAML file, see docs/own_robot.md and docs/humanoid.md.
+    # Robot: go2, a1, or a YAML file, see docs/own_robot.md; or g1, see
+    # docs/humanoid.md.
     robot: Annotated[str, tyro.conf.arg(metavar="ROBOT|FILE")] = "go2"
     # Contact solver, time step and friction.
     plant: PlantConfig = field(default_factory=PlantConfig)
