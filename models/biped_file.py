@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from loco_drake.common.arrays import Array
-from loco_drake.common.errors import InputError, check_choice, quoted
+from loco_drake.common.errors import InputError, check_choice, check_number, quoted
 from loco_drake.common.typed_yaml import read_yaml
 
 from .biped import Biped
+from .robot_files import named
 from .urdf import find_urdf, read_limits, read_xml, strip_urdf, unreadable
 
 BIPEDS = ("g1",)  # that are shipped
@@ -41,8 +42,29 @@ class LimbFile:
 
 
 @dataclass(kw_only=True)
+class MotorsFile:
+    """What simulating a humanoid takes beyond its URDF."""
+
+    # Angle from the set-point at which a motor reaches its torque limit, rad.
+    give: float = 0.25
+    # Damping ratio of each joint about its inertia in the stance.
+    damping_ratio: float = 1.0
+    # Coulomb's coefficient of the soles.
+    foot_friction: float = 0.8
+
+    def check(self) -> None:
+        """Raises InputError unless all is within bounds."""
+        for name, least, most in (
+            ("give", 0.01, 3.0),
+            ("damping_ratio", 0.1, 5.0),
+            ("foot_friction", 0.05, 3.0),
+        ):
+            check_number(f"simulation.{name}", getattr(self, name), least, most)
+
+
+@dataclass(kw_only=True)
 class BipedFile:
-    """A humanoid to retarget to."""
+    """A humanoid to retarget to, and to simulate."""
 
     # By default that of the file.
     name: str = ""
@@ -57,6 +79,7 @@ class BipedFile:
     # By left and right.
     legs: dict[str, LimbFile] = field(default_factory=dict)
     arms: dict[str, LimbFile] = field(default_factory=dict)
+    simulation: MotorsFile = field(default_factory=MotorsFile)
 
 
 def read_biped(definition: str) -> Biped:
@@ -65,16 +88,32 @@ def read_biped(definition: str) -> Biped:
     Raises:
         InputError: naming what is missing, unknown or impossible.
     """
+    return _read(_path(definition), definition if definition in BIPEDS else "")
+
+
+def read_biped_file(definition: str) -> tuple[BipedFile, Path]:
+    """Returns what a humanoid's file says, and where its URDF is.
+
+    Raises:
+        InputError: as :func:`read_biped`.
+    """
+    path = _path(definition)
+    file = read_yaml(path, BipedFile, "a humanoid's file")
+    with named(path):
+        _check(file)
+        file.simulation.check()
+        return file, find_urdf(file.urdf, path.parent)
+
+
+def _path(definition: str) -> Path:
     if definition in BIPEDS:
-        path = Path(__file__).parent / definition / f"{definition}.yaml"
-    elif Path(definition).suffix in (".yaml", ".yml"):
-        path = Path(definition).resolve()
-    else:
-        raise InputError(
-            f"Unknown humanoid {quoted(definition)}; the choices are "
-            f"{', '.join(BIPEDS)}, or a humanoid's YAML file."
-        )
-    return _read(path, definition if definition in BIPEDS else str(path))
+        return Path(__file__).parent / definition / f"{definition}.yaml"
+    if Path(definition).suffix in (".yaml", ".yml"):
+        return Path(definition).resolve()
+    raise InputError(
+        f"Unknown humanoid {quoted(definition)}; the choices are "
+        f"{', '.join(BIPEDS)}, or a humanoid's YAML file."
+    )
 
 
 def is_biped_file(definition: str) -> bool:
@@ -88,11 +127,9 @@ def is_biped_file(definition: str) -> bool:
 @lru_cache
 def _read(path: Path, definition: str) -> Biped:
     file = read_yaml(path, BipedFile, "a humanoid's file")
-    try:
+    with named(path):
         _check(file)
-        return _make(file, path, definition)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+        return _make(file, path, definition or str(path))
 
 
 def _check(file: BipedFile) -> None:

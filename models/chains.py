@@ -1,10 +1,8 @@
 """A robot whose legs are chains of any revolute joints, as its URDF has them.
 
-Each joint turns what lies beyond it about an axis that is known where all joints are
-at zero: products of exponentials (Brockett 1984; Lynch and Park 2017, "Modern
-Robotics", chapter 4). Toes are placed by Newton's method, damped, within the joints'
-limits, all frames and legs at once; its curvature is exact, so that a leg that is too
-short finds its best as fast.
+Its kinematics are those of :mod:`.chain_kinematics`. Toes are placed by Newton's
+method, damped, within the joints' limits, all frames and legs at once; its curvature is
+exact, so that a leg that is too short finds its best as fast.
 """
 
 from dataclasses import dataclass
@@ -15,8 +13,9 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from loco_drake.common.arrays import Array
-from loco_drake.common.rotations import quat_multiply, quat_rotate
+from loco_drake.common.rotations import quat_rotate
 
+from .chain_kinematics import turn_chains
 from .quadruped import Quadruped
 
 _FOLD_SAMPLES = 1000
@@ -123,19 +122,9 @@ class ChainRobot(Quadruped):
 
         Joints are in rad, shape (..., 4, n).
         """
-        half = joints[..., None] / 2
-        turns = np.concatenate((np.cos(half), np.sin(half) * self.axes), axis=-1)
-        q = np.broadcast_to([1.0, 0.0, 0.0, 0.0], (*joints.shape[:-1], 4))
-        p = np.zeros((*joints.shape[:-1], 3))
-        axes, origins = [], []
-        for k in range(joints.shape[-1]):
-            origin = self.origins[:, k]
-            axes.append(quat_rotate(q, self.axes[:, k]))
-            origins.append(p + quat_rotate(q, origin))
-            q = quat_multiply(q, turns[..., k, :])
-            p = origins[-1] - quat_rotate(q, origin)
+        q, p, axes, origins = turn_chains(self.axes, self.origins, joints)
         toes = p + quat_rotate(q, self.toes)
-        return toes, np.stack(axes, axis=-2), np.stack(origins, axis=-2)
+        return toes, axes, origins
 
 
 def _legs(joints: Array) -> Array:

@@ -10,10 +10,10 @@ from pydrake.systems.framework import Context
 
 from loco_drake.common.arrays import Array
 
-from .quadruped import Quadruped
+from .legged import LeggedRobot
 
 
-def inverse_dynamics(robot: Quadruped, q: Array, v: Array, vdot: Array) -> Array:
+def inverse_dynamics(robot: LeggedRobot, q: Array, v: Array, vdot: Array) -> Array:
     """Returns the generalized forces, (N, 6 + J), that a motion takes beside gravity.
 
     They are M(q) vdot + C(q, v) v - tau_g(q): moments and forces on the base, in the
@@ -33,7 +33,7 @@ def inverse_dynamics(robot: Quadruped, q: Array, v: Array, vdot: Array) -> Array
 
 
 @lru_cache(maxsize=4)
-def _plant(robot: Quadruped) -> tuple[MultibodyPlant, Context]:
+def _plant(robot: LeggedRobot) -> tuple[MultibodyPlant, Context]:
     # CalcInverseDynamics uses no contacts, so there is neither ground nor scene graph.
     plant = MultibodyPlant(time_step=0.0)
     robot.AddModel(Parser(plant))

@@ -19,7 +19,7 @@ from loco_drake.common.errors import InputError, check_choice, check_number
 
 from .ground import AddGround
 from .movable_ground import FilterMovableGround
-from .robots import Robot
+from .simulated import SimulatedRobot
 
 CONTACTS = ("similar", "lagged", "sap", "cenic")
 
@@ -53,8 +53,8 @@ class PlantConfig:
             check_number(f"The plant's {name}", getattr(self, name), low, high)
 
 
-def plant_damping(robot: Robot, config: PlantConfig) -> Array:
-    """Returns the damping of the PD in the plant, N m s/rad, shape (12,).
+def plant_damping(robot: SimulatedRobot, config: PlantConfig) -> Array:
+    """Returns the damping of the PD in the plant, N m s/rad, shape (J,).
 
     A discrete plant applies its PD implicitly. With q and v at the beginning of a step
     of length h and v' at its end, the torque is
@@ -82,7 +82,7 @@ def plant_damping(robot: Robot, config: PlantConfig) -> Array:
 
 def AddRobotPlant(
     builder: DiagramBuilder,
-    robot: Robot,
+    robot: SimulatedRobot,
     config: PlantConfig,
     pre_finalize: Callable[[MultibodyPlant, SceneGraph], None] | None = None,
     *,
@@ -93,7 +93,7 @@ def AddRobotPlant(
     The systems are named "plant" and "scene_graph". By default the robot stands: trunk
     at (0, 0, robot.stand_height), joints at robot.stand_joints. Its PD runs inside the
     plant; the port ``plant.get_desired_state_input_port(instance)`` takes [q_d; v_d] of
-    the 12 joints, in rad and rad/s. The joints are limp while it is not connected. v_d
+    the J joints, in rad and rad/s. The joints are limp while it is not connected. v_d
     must be 0, since CENIC of Drake 1.51 applies it with the wrong sign. The PD has the
     stiffness robot.kp and the damping :func:`plant_damping`.
 

@@ -59,7 +59,7 @@ def read_rigid_model(path: Path, trunk: str, legs: Sequence[LegFile]) -> RigidMo
     """
     root = read_xml(path)
     names = [joint for leg in legs for joint in leg.joints]
-    efforts = np.array([_effort(root, name) for name in names])
+    efforts = np.array([read_effort(root, name) for name in names])
     plant = MultibodyPlant(time_step=0.0)
     try:
         model = strip_urdf(root, names, inertial=True)
@@ -119,7 +119,7 @@ def _body(plant: MultibodyPlant, context: Context, frame: Frame, name: str) -> B
     return Body(name, M.get_mass(), M.get_com(), central)
 
 
-def _effort(root: ET.Element, joint: str) -> float:
+def read_effort(root: ET.Element, joint: str) -> float:
     """Returns a joint's limit of torque, nan if there is none."""
     (element,) = (j for j in root.iterfind("joint") if j.get("name") == joint)
     limit = element.find("limit")

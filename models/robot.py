@@ -2,23 +2,23 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.tree import ModelInstanceIndex
 
-from loco_drake.common.arrays import Array
+from loco_drake.common.arrays import Array, Integers
 
 from .parsing import AddUrdf
 from .quadruped import Quadruped
+from .simulated import SimulatedRobot
 
 ROBOTS = ("go2", "a1")  # that are shipped
 LEAST_PAYLOAD = -3.0  # kg, of theirs; bounds hold down to this payload
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Robot(Quadruped):
+class Robot(Quadruped, SimulatedRobot):
     """A quadruped with three joints per leg, all read from its Drake model.
 
     Every leg has a hip (about x, abduction), a thigh and a calf (both about y), in this
@@ -38,16 +38,6 @@ class Robot(Quadruped):
 
     url: str = ""  # the model, package://...; see ConfigureParser
     model: str = ""  # text of the model's URDF; "" if it has a url
-    effort_limits: Array  # at the joint, N m, shape (12,)
-    reflected_inertia: Array  # of the rotors at the joint, kg m^2, shape (12,)
-    # About each joint with the others locked in the standing pose, including reflected
-    # inertia, kg m^2, shape (12,).
-    joint_inertia: Array
-    kp: Array  # stiffness of the motors' PD, N m/rad, shape (12,)
-    # Damping of the motors' PD, N m s/rad, shape (12,). A plant's own is less, see
-    # models.plant.plant_damping.
-    kd: Array
-    mass: float  # of the whole robot, kg
     # Y in m from the hip joint's axis to the plane in which the toe moves at zero
     # abduction, that of the thigh joint of Go2 and A1; positive on the left, shape
     # (4,).
@@ -66,8 +56,6 @@ class Robot(Quadruped):
     # every pose, also with ``least_payload``, kg m^2.
     removable_inertia: float
     least_payload: float  # mass added to the trunk at least, kg
-    trunk_size: Array  # of the trunk's collision box, centred at B, in m, shape (3,)
-    weights: Path | None = None  # folder of its own networks, or None
 
     @property
     def p_BV(self) -> Array:
@@ -85,6 +73,19 @@ class Robot(Quadruped):
     def AddModel(self, parser: Parser, *, visual: bool = False) -> ModelInstanceIndex:
         """Adds the model, by default without its meshes, to the parser's plant."""
         return AddUrdf(parser, url=self.url, model=self.model, visual=visual)
+
+    @property
+    def contact_joints(self) -> Integers:
+        """Those of each leg, shape (4, 3)."""
+        return np.arange(len(self.joint_names)).reshape(4, -1)
+
+    def contact_points(self, joints: Array) -> Array:
+        """Returns the toes in B, m, shape (..., 4, 3)."""
+        return self.toe_positions(joints)
+
+    def contact_jacobians(self, joints: Array) -> Array:
+        """Returns d p_BF / d joints of each toe, m/rad, (..., 4, 3, 3)."""
+        return self.toe_jacobians(joints)
 
     def leg_angles(self, joints: Array) -> Array:
         """Returns the leg angles of joints, both in rad, shape (..., 12)."""

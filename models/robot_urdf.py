@@ -14,7 +14,7 @@ from .xml_text import add_element, value_text
 
 
 class Motors(NamedTuple):
-    """What drives and limits the joints, each of shape (12,)."""
+    """What drives and limits the joints, each of shape (J,)."""
 
     lower: Array  # rad
     upper: Array  # rad
@@ -39,8 +39,8 @@ class Shapes(NamedTuple):
 
 
 _BODY_FRICTION = 0.5  # of trunk and knees, as of Go2 and A1
-_COLORS = {"trunk": "0.3 0.32 0.36", "L": "0.85 0.6 0.25", "R": "0.4 0.55 0.75"}
-_FOOT_COLOR = "0.1 0.1 0.1"
+COLORS = {"trunk": "0.3 0.32 0.36", "L": "0.85 0.6 0.25", "R": "0.4 0.55 0.75"}
+FOOT_COLOR = "0.1 0.1 0.1"
 
 
 def write_urdf(
@@ -51,8 +51,10 @@ def write_urdf(
     trunk, *links = model.bodies
     element = _link(root, trunk)
     box = {"box": {"size": shapes.trunk_size}}
-    _visual(element, box, _COLORS["trunk"], np.zeros(3))
-    _collision(element, "trunk", box, np.zeros(3), shapes, _BODY_FRICTION)
+    add_visual(element, box, COLORS["trunk"], np.zeros(3))
+    contact = {"stiffness": shapes.stiffness, "dissipation": shapes.dissipation}
+    rubbing = {**contact, "friction": _BODY_FRICTION}
+    add_collision(element, "trunk", box, np.zeros(3), **rubbing)
     sphere = {"sphere": {"radius": shapes.foot_radius}}
     for k, (hinge, body) in enumerate(zip(model.hinges, links, strict=True)):
         leg, part = divmod(k, 3)
@@ -60,19 +62,21 @@ def write_urdf(
         _joint(root, hinge, parent, body.name, motors, k)
         element = _link(root, body)
         start, end = shapes.sticks[k]
-        _stick(element, start, end, shapes.foot_radius, _COLORS["LR"[leg % 2]])
+        add_stick(element, start, end, shapes.foot_radius, COLORS["LR"[leg % 2]])
         if part == 1:
             knee = shapes.knees[leg]
-            _collision(element, f"knee{leg}", sphere, knee, shapes, _BODY_FRICTION)
+            add_collision(element, f"knee{leg}", sphere, knee, **rubbing)
         if part == 2:
             p_foot = model.feet[leg].translation()
-            _visual(element, sphere, _FOOT_COLOR, p_foot)
+            add_visual(element, sphere, FOOT_COLOR, p_foot)
             friction = shapes.foot_friction
-            _collision(element, f"toe{leg}", sphere, p_foot, shapes, friction)
+            add_collision(
+                element, f"toe{leg}", sphere, p_foot, friction=friction, **contact
+            )
             pose = _pose(model.feet[leg])
             add_element(root, "frame", name=feet[leg], link=body.name, **pose)
     for k, hinge in enumerate(model.hinges):
-        _transmission(root, hinge.name, motors, k)
+        add_transmission(root, hinge.name, motors, k)
     group = add_element(root, "drake:collision_filter_group", name="robot")
     for body in model.bodies:
         add_element(group, "drake:member", link=body.name)
@@ -101,6 +105,11 @@ def _joint(
     add_element(joint, "child", link=child)
     add_element(joint, "origin", **_pose(hinge.X_PJ))
     add_element(joint, "axis", xyz=hinge.axis)
+    add_limits(joint, motors, k)
+
+
+def add_limits(joint: ET.Element, motors: Motors, k: int) -> None:
+    """Adds the limits of a joint, which is number ``k`` of ``motors``."""
     add_element(
         joint,
         "limit",
@@ -111,7 +120,8 @@ def _joint(
     )
 
 
-def _transmission(root: ET.Element, joint: str, motors: Motors, k: int) -> None:
+def add_transmission(root: ET.Element, joint: str, motors: Motors, k: int) -> None:
+    """Adds the motor of a joint, which is number ``k`` of ``motors``."""
     element = add_element(root, "transmission", name=f"{joint}_transmission")
     kind = add_element(element, "type")
     kind.text = "transmission_interface/SimpleTransmission"
@@ -123,20 +133,23 @@ def _transmission(root: ET.Element, joint: str, motors: Motors, k: int) -> None:
     add_element(actuator, "drake:controller_gains", **gains)
 
 
-def _collision(
+def add_collision(
     link: ET.Element,
     name: str,
     shape: dict[str, dict[str, Any]],
     at: Array,
-    shapes: Shapes,
+    *,
     friction: float,
+    stiffness: float,
+    dissipation: float,
 ) -> None:
+    """Adds a shape that touches: Coulomb's friction, N/m and s/m of its contacts."""
     collision = add_element(link, "collision", name=name)
     _shape(collision, shape, at)
     properties = add_element(collision, "drake:proximity_properties")
     for key, value in (
-        ("point_contact_stiffness", shapes.stiffness),
-        ("hunt_crossley_dissipation", shapes.dissipation),
+        ("point_contact_stiffness", stiffness),
+        ("hunt_crossley_dissipation", dissipation),
         # Of "sap" only; Drake's own would let feet sink in.
         ("relaxation_time", 1e-3),
         ("mu_static", friction),
@@ -145,9 +158,10 @@ def _collision(
         add_element(properties, f"drake:{key}", value=value)
 
 
-def _visual(
+def add_visual(
     link: ET.Element, shape: dict[str, dict[str, Any]], color: str, at: Array
 ) -> ET.Element:
+    """Adds a shape that is seen, at a place in the link's frame, m; returns it."""
     visual = add_element(link, "visual")
     _shape(visual, shape, at)
     material = add_element(visual, "material")
@@ -155,18 +169,19 @@ def _visual(
     return visual
 
 
-def _stick(
+def add_stick(
     link: ET.Element, start: Array, end: Array, radius: float, color: str
 ) -> None:
+    """Adds a rod that is seen, between two places in the link's frame, m."""
     way = end - start
     length = float(np.linalg.norm(way))
     if length < radius:
-        _visual(link, {"sphere": {"radius": 0.8 * radius}}, color, start)
+        add_visual(link, {"sphere": {"radius": 0.8 * radius}}, color, start)
         return
     pitch = np.arctan2(np.hypot(way[0], way[1]), way[2])
     rpy = np.array([0.0, pitch, np.arctan2(way[1], way[0])])
     rod = {"cylinder": {"radius": 0.8 * radius, "length": length}}
-    visual = _visual(link, rod, color, (start + end) / 2)
+    visual = add_visual(link, rod, color, (start + end) / 2)
     (origin,) = visual.iterfind("origin")
     origin.set("rpy", value_text(rpy))
 

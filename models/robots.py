@@ -14,7 +14,8 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError, check_choice, quoted
 
-from .biped_file import is_biped_file, read_biped
+from .biped_file import BIPEDS, is_biped_file, read_biped
+from .humanoids import humanoid_settings, read_humanoid
 from .legged import LeggedRobot
 from .legs import LEGS
 from .own_robots import Setting, read_own_robot
@@ -25,6 +26,7 @@ from .robot import LEAST_PAYLOAD
 from .robot import ROBOTS as ROBOTS
 from .robot import Robot as Robot
 from .robot_files import is_robot_file, read_robot
+from .simulated import SimulatedRobot as SimulatedRobot
 
 LEG_JOINTS = ("hip", "thigh", "calf")
 
@@ -68,6 +70,26 @@ def get_robot(definition: str) -> Robot:
     return _read_shipped(definition)
 
 
+def get_simulated(definition: str) -> SimulatedRobot:
+    """Returns a robot that can be simulated: as :func:`get_robot`, or a humanoid.
+
+    Args:
+        definition: as of :func:`get_robot`; or one of :data:`.biped_file.BIPEDS`, or a
+            humanoid's YAML file.
+
+    Raises:
+        InputError: if there is no such robot, or the file or its URDF will not do.
+    """
+    if is_biped_file(definition):
+        return read_humanoid(definition)
+    if is_robot_file(definition) or definition in _READ or definition in ROBOTS:
+        return get_robot(definition)
+    raise InputError(
+        f"Unknown robot {quoted(definition)}; the choices are "
+        f"{', '.join((*ROBOTS, *BIPEDS))}, or a robot's YAML file."
+    )
+
+
 def known_robot(name: str) -> Robot | None:
     """Returns the robot of a name that :func:`get_robot` knows, or None."""
     return get_robot(name) if name in (*ROBOTS, *_READ) else None
@@ -102,8 +124,10 @@ def robot_settings(path: Path) -> tuple[Setting, ...]:
     """Returns what the robot in a YAML file is simulated with, each with its source.
 
     Raises:
-        InputError: as :func:`get_robot`.
+        InputError: as :func:`get_simulated`.
     """
+    if is_biped_file(str(path)):
+        return humanoid_settings(str(path))
     return _read_file(path.resolve())[1]
 
 

@@ -7,12 +7,10 @@ from loco_drake.common.errors import InputError
 
 # Help of commands lists the policies, and does not wait for Drake.
 if TYPE_CHECKING:
-    from .robots import Robot
+    from .simulated import SimulatedRobot
 
-_HOW_TO_TRAIN = (
-    " Train one with loco-drake train tracker, and give it with --policy, or name its "
-    "folder as weights in the robot's file."
-)
+_HOW_TO_TRAIN = " Train one with loco-drake train tracker, and give it with --policy"
+_OR_NAME_IT = ", or name its folder as weights in the robot's file."
 
 
 def pretrained_dir() -> Path:
@@ -73,14 +71,14 @@ def shipped_policies() -> dict[str, Path]:
     }
 
 
-def policy_variants(robot: "Robot") -> dict[str, Path]:
+def policy_variants(robot: "SimulatedRobot") -> dict[str, Path]:
     """Returns the shipped policies of ``robot`` except the main one, by name."""
     prefix = f"{robot.name}_"
     shipped = shipped_policies().items()
     return {k.removeprefix(prefix): f for k, f in shipped if k.startswith(prefix)}
 
 
-def own_weights(robot: "Robot") -> dict[str, Path]:
+def own_weights(robot: "SimulatedRobot") -> dict[str, Path]:
     """Returns the weights in the folder that a robot's file names, as weights_in.
 
     Raises:
@@ -96,7 +94,7 @@ def own_weights(robot: "Robot") -> dict[str, Path]:
     return weights_in(robot.weights)
 
 
-def network_path(robot: "Robot", kind: str) -> Path:
+def network_path(robot: "SimulatedRobot", kind: str) -> Path:
     """Returns a robot's weights of a kind, its own or the shipped "tokenizer", ...
 
     Raises:
@@ -105,7 +103,7 @@ def network_path(robot: "Robot", kind: str) -> Path:
     return own_weights(robot).get(kind, pretrained_path(kind))
 
 
-def policy_path(robot: "Robot", policy: Path | None = None) -> Path:
+def policy_path(robot: "SimulatedRobot", policy: Path | None = None) -> Path:
     """Returns the weights file of a policy.
 
     ``policy`` is a weights file, which is returned as it is, or the name of a shipped
@@ -119,14 +117,15 @@ def policy_path(robot: "Robot", policy: Path | None = None) -> Path:
         shipped = pretrained_path(f"policy_{robot.name}")
         main = own_weights(robot).get("policy", shipped)
         if not main.is_file():
+            from .biped import Biped
             from .robots import ROBOTS
 
+            how = "" if robot.name in ROBOTS else _HOW_TO_TRAIN
+            how += "." if isinstance(robot, Biped) else _OR_NAME_IT * bool(how)
             present = [n for n in ROBOTS if pretrained_path(f"policy_{n}").is_file()]
             raise InputError(
                 f"There are no policy weights for {robot.name} yet; "
-                f"there are some for {', '.join(present) or 'no robot'}."
-                + _HOW_TO_TRAIN
-                * (robot.name not in ROBOTS)
+                f"there are some for {', '.join(present) or 'no robot'}." + how
             )
         return main
     if policy.name != str(policy) or policy.suffix or policy.exists():

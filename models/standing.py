@@ -7,7 +7,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from .plant import AddRobotPlant, ConfigureSimulator, PlantConfig
-from .robot import Robot
+from .simulated import SimulatedRobot
 
 # Share of the height, rad and m/s; a robot that is held is within a third of each.
 _MOST_SUNK, _MOST_TILT, _MOST_SPEED = 0.2, 0.2, 0.02
@@ -28,7 +28,7 @@ class Standing(NamedTuple):
         return bool(held and self.tilt < _MOST_TILT and self.speed < _MOST_SPEED)
 
 
-def stand(robot: Robot, seconds: float = 2.0) -> Standing:
+def stand(robot: SimulatedRobot, seconds: float = 2.0) -> Standing:
     """Simulates a robot whose set-points are those of the stance."""
     config = PlantConfig()
     builder = DiagramBuilder()

@@ -17,12 +17,12 @@ from pydrake.systems.framework import (
 from loco_drake.control.action import joint_targets, set_points
 from loco_drake.control.actor import Actor
 from loco_drake.control.actor_file import act
-from loco_drake.control.observation import OBSERVATION_SIZE, observe, preview
+from loco_drake.control.observation import layout_of, observe, preview
 from loco_drake.control.plan import PLAN_DT, Plan, standing_plan
 from loco_drake.control.reward import REWARD_TERMS, reward_terms
 from loco_drake.control.state import unit_base
 from loco_drake.control.terrain import Terrain
-from loco_drake.models.robots import Robot
+from loco_drake.models.simulated import SimulatedRobot
 
 
 class PlanPlayer(LeafSystem):
@@ -39,7 +39,7 @@ class PlanPlayer(LeafSystem):
     robot stands.
     """
 
-    def __init__(self, robot: Robot, plan: Plan | None = None) -> None:
+    def __init__(self, robot: SimulatedRobot, plan: Plan | None = None) -> None:
         super().__init__()
         first = Value(plan or standing_plan(robot))
         self._plan = self.DeclareAbstractParameter(first)
@@ -68,7 +68,7 @@ class RobotState(LeafSystem):
     which is a parameter, the state is that over the ground, see :class:`Terrain`.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: SimulatedRobot) -> None:
         super().__init__()
         self.robot = robot
         size = 13 + 2 * len(robot.joint_names)
@@ -95,7 +95,9 @@ class RobotState(LeafSystem):
         output.set_value(state if terrain is None else terrain.over_ground(state))
 
 
-def FindRobot(diagram: Diagram) -> tuple[Robot, MultibodyPlant, ModelInstanceIndex]:
+def FindRobot(
+    diagram: Diagram,
+) -> tuple[SimulatedRobot, MultibodyPlant, ModelInstanceIndex]:
     """Returns robot, plant and the robot's instance in it, of a locomotion diagram."""
     robot = diagram.GetSubsystemByName("robot_state").robot
     plant = diagram.GetSubsystemByName("plant")
@@ -105,7 +107,7 @@ def FindRobot(diagram: Diagram) -> tuple[Robot, MultibodyPlant, ModelInstanceInd
 class PlanFollower(LeafSystem):
     """Base of systems with an input port ``plan``, of a robot."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: SimulatedRobot) -> None:
         super().__init__()
         self._robot = robot
         self._joints = len(robot.joint_names)
@@ -130,7 +132,7 @@ class PlanState(PlanFollower):
         - path_time: vector (1,), time before smoothing; s
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: SimulatedRobot) -> None:
         super().__init__(robot)
         size = 13 + 2 * self._joints
         self.DeclareVectorOutputPort("state", size, self._calc_state)
@@ -156,14 +158,15 @@ class Observation(PlanFollower):
         - state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s; as measured
         - action: vector (J,), the action in use; ACTION_SCALE
         output_ports:
-        - observation: vector (OBSERVATION_SIZE,); see OBSERVATION_LAYOUT
+        - observation: vector (N,), N the size of the robot's Layout
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: SimulatedRobot) -> None:
         super().__init__(robot)
         self._state = self.DeclareVectorInputPort("state", 13 + 2 * self._joints)
         self._action = self.DeclareVectorInputPort("action", self._joints)
-        self.DeclareVectorOutputPort("observation", OBSERVATION_SIZE, self._calc)
+        size = layout_of(robot).size
+        self.DeclareVectorOutputPort("observation", size, self._calc)
 
     def _calc(self, context: Context, output: Any) -> None:
         ahead = preview(self._plan.Eval(context), context.get_time())
@@ -178,9 +181,9 @@ class TrackingPolicy(LeafSystem):
 
         name: TrackingPolicy
         input_ports:
-        - observation: vector (OBSERVATION_SIZE,); see OBSERVATION_LAYOUT
+        - observation: vector (N,), N the size of the robot's Layout
         output_ports:
-        - action: vector (12,); ACTION_SCALE
+        - action: vector (J,); ACTION_SCALE
 
     :class:`JointTargets` samples it. A policy with a memory (:meth:`Actor.step`) keeps
     it in discrete state: zeros in a default Context, updated every PLAN_DT together
@@ -190,7 +193,8 @@ class TrackingPolicy(LeafSystem):
     def __init__(self, actor: Actor) -> None:
         super().__init__()
         self._actor = actor
-        self._observation = self.DeclareVectorInputPort("observation", OBSERVATION_SIZE)
+        size = actor.layout.size
+        self._observation = self.DeclareVectorInputPort("observation", size)
         self._nothing = np.zeros(0)
         prerequisites = {self._observation.ticket()}
         if actor.memory_size:
@@ -207,7 +211,10 @@ class TrackingPolicy(LeafSystem):
             ),
             prerequisites,
         )
-        self.DeclareVectorOutputPort("action", 12, self._calc, {self._step.ticket()})
+        joints = len(actor.config.mirror_joints)
+        self.DeclareVectorOutputPort(
+            "action", joints, self._calc, {self._step.ticket()}
+        )
 
     def _calc_step(self, context: Context, output: AbstractValue) -> None:
         memory = self._nothing
@@ -242,7 +249,7 @@ class JointTargets(PlanFollower):
     action takes effect without delay.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: SimulatedRobot) -> None:
         super().__init__(robot)
         still = 0 * robot.stand_joints
         self._action = self.DeclareVectorInputPort("action", self._joints)
@@ -276,7 +283,7 @@ class TrackingReward(PlanFollower):
         - reward_terms: vector (5,), weighted; see REWARD_TERMS
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: SimulatedRobot) -> None:
         super().__init__(robot)
         self._state = self.DeclareVectorInputPort("state", 13 + 2 * self._joints)
         self.DeclareVectorOutputPort("reward_terms", len(REWARD_TERMS), self._calc)

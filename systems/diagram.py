@@ -22,7 +22,7 @@ from loco_drake.control.gait_choice import best_gait
 from loco_drake.control.plan import plan_from_motion
 from loco_drake.control.retiming import fall_limit
 from loco_drake.models.plant import AddRobotPlant
-from loco_drake.models.robots import Robot, get_robot
+from loco_drake.models.robots import Robot, SimulatedRobot, get_simulated
 from loco_drake.models.shipped import policy_path
 from loco_drake.motion.gaits import ANY, gait_name
 from loco_drake.motion.motion_file import load_motion
@@ -54,7 +54,7 @@ from .toppra_smoother import ToppraSmoother
 class Locomotion:
     """The systems that :func:`AddLocomotion` added, with ports to connect."""
 
-    robot: Robot
+    robot: SimulatedRobot
     plant: MultibodyPlant  # finalized; contains the robot
     scene_graph: SceneGraph
     instance: ModelInstanceIndex  # the robot's in the plant
@@ -90,7 +90,7 @@ def MakeLocomotionDiagram(
         - plan_state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s
         - path_time: vector (1,), time before smoothing; s
         - followed: vector (3,), the command as far as it is followed; m/s, rad/s
-        - observation: vector (OBSERVATION_SIZE,); see OBSERVATION_LAYOUT
+        - observation: vector (N,), N the size of the robot's Layout
         - action: vector (J,), the action in use; ACTION_SCALE
         - desired_state: vector (2 J,), [q_d, 0]; rad, rad/s
         - reward_terms: vector (5,), weighted; see REWARD_TERMS
@@ -145,7 +145,7 @@ def AddLocomotion(
             "The builder has a system named plant already: AddLocomotion makes the "
             "plant, and its pre_finalize adds your bodies to it."
         )
-    robot = get_robot(scenario.robot)
+    robot = get_simulated(scenario.robot)
     plant, scene_graph, instance = AddRobotPlant(
         builder,
         robot,
@@ -191,6 +191,7 @@ def _AddDisturbances(
     robot, plant, wanted = made.robot, made.plant, scenario.disturbances
     desired_state = plant.get_desired_state_input_port(made.instance)
     if wanted.actuation:
+        assert isinstance(robot, Robot)  # as the scenario checks
         actuation = Actuation(robot, scenario.plant)
         _Add(builder, "actuation", actuation, state=state)
         made.outputs["desired_state"] = actuation.GetOutputPort("desired_state")
@@ -210,9 +211,12 @@ def _AddDisturbances(
 
 
 def AddPlan(
-    builder: DiagramBuilder, robot: Robot, scenario: Scenario
+    builder: DiagramBuilder, robot: SimulatedRobot, scenario: Scenario
 ) -> tuple[dict[str, InputPort], dict[str, OutputPort]]:
     """Adds reference, steering and smoother, which depend on no robot's state.
+
+    Steering and smoother are of robots with three joints a leg; others follow the
+    reference itself.
 
     Returns their input and output ports by name, see :func:`MakeLocomotionDiagram`.
     """
@@ -221,8 +225,9 @@ def AddPlan(
     inputs, outputs, chain = {}, {}, [reference]
     if reference.HasInputPort("gait"):
         inputs["gait"] = reference.GetInputPort("gait")
-    if scenario.steering is not None:
-        steering = Steering(robot, scenario.steering)
+    quadruped = robot if isinstance(robot, Robot) else None
+    if quadruped and scenario.steering is not None:
+        steering = Steering(quadruped, scenario.steering)
         _Add(builder, "steering", steering, plan=chain[-1].GetOutputPort("plan"))
         inputs["command"] = steering.GetInputPort("command")
         outputs["followed"] = steering.GetOutputPort("followed")
@@ -231,16 +236,16 @@ def AddPlan(
             builder.Connect(told, reference.GetInputPort("command"))
         chain.append(steering)
         if isinstance(scenario.reference, GeneratedReference):
-            selector = GaitSelector(robot, str(scenario.reference.gait))
+            selector = GaitSelector(quadruped, str(scenario.reference.gait))
             command = steering.GetOutputPort("asked")
             _Add(builder, "gait_selector", selector, command=command)
             builder.Connect(selector.GetOutputPort("gait"), inputs["gait"])
             inputs["gait"] = selector.GetInputPort("gait")
-    if scenario.smoother is not None:
+    if quadruped and scenario.smoother is not None:
         config = scenario.smoother
         if config.fall is None:
             config = replace(config, fall=fall_limit(grounded))
-        smoother = ToppraSmoother(robot, config)
+        smoother = ToppraSmoother(quadruped, config)
         _Add(builder, "smoother", smoother, plan=chain[-1].GetOutputPort("plan"))
         ports = ("path_time", "fixed_time", "clock_rate")
         for system, name in product(chain, ports):
@@ -251,10 +256,13 @@ def AddPlan(
     return inputs, outputs
 
 
-def _MakeReference(robot: Robot, scenario: Scenario) -> tuple[LeafSystem, bool]:
+def _MakeReference(
+    robot: SimulatedRobot, scenario: Scenario
+) -> tuple[LeafSystem, bool]:
     """Returns the reference, and whether its motion is grounded."""
     reference = scenario.reference
     if isinstance(reference, GeneratedReference):
+        assert isinstance(robot, Robot)  # as the scenario checks
         # Imports torch models, which a player does not need.
         from .reference_generator import ReferenceGenerator
 

@@ -35,7 +35,7 @@ from loco_drake.models.parameters import (
     surplus_inertia,
 )
 from loco_drake.models.plant import PlantConfig
-from loco_drake.models.robots import Robot
+from loco_drake.models.robots import Robot, SimulatedRobot
 
 from .control import FindRobot
 
@@ -219,7 +219,7 @@ class Sensors(DomainSystem):
         - state: vector (13 + 2 J,), [q, v]; m, rad, m/s, rad/s; as measured
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: SimulatedRobot) -> None:
         super().__init__()
         size = 13 + 2 * len(robot.joint_names)
         self._state = self.DeclareVectorInputPort("state", size)

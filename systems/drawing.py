@@ -9,7 +9,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.lcm import ApplyLcmBusConfig
 from pydrake.visualization import ApplyVisualizationConfig, VisualizationConfig
 
-from loco_drake.models.robots import Robot
+from loco_drake.models.simulated import SimulatedRobot
 
 from .keypoint_visualizer import KeypointVisualizer
 
@@ -21,7 +21,7 @@ _FORCE_RADIUS = 0.008  # m
 
 def AddDrawing(
     builder: DiagramBuilder,
-    robot: Robot,
+    robot: SimulatedRobot,
     plant: MultibodyPlant,
     config: VisualizationConfig,
     meshcat: Meshcat,

@@ -6,8 +6,8 @@ from pydrake.systems.framework import Context, LeafSystem
 
 from loco_drake.control.state import POSITION
 from loco_drake.models.ground import FLOOR_Z, TILE
-from loco_drake.models.robots import Robot
 from loco_drake.models.scenery import EYE, TARGET
+from loco_drake.models.simulated import SimulatedRobot
 
 _FLOOR = "/drake/illustration/floor"
 # m; the floor's pattern repeats every two tiles.
@@ -34,7 +34,9 @@ class FollowCamera(LeafSystem):
         period: time between frames in s; a sum of powers of two keeps times exact.
     """
 
-    def __init__(self, robot: Robot, meshcat: Meshcat, period: float = 1 / 64) -> None:
+    def __init__(
+        self, robot: SimulatedRobot, meshcat: Meshcat, period: float = 1 / 64
+    ) -> None:
         super().__init__()
         self._meshcat = meshcat
         meshcat.SetCameraPose(EYE, TARGET)

@@ -8,7 +8,8 @@ from pydrake.systems.framework import Context
 from loco_drake.common.arrays import Array
 from loco_drake.common.rotations import quat_rotate
 from loco_drake.control.state import JOINTS, ORIENTATION, POSITION
-from loco_drake.models.robots import Robot
+from loco_drake.models.robot import Robot
+from loco_drake.models.simulated import SimulatedRobot
 
 from .control import PlanFollower
 
@@ -37,7 +38,11 @@ class KeypointVisualizer(PlanFollower):
     """
 
     def __init__(
-        self, robot: Robot, meshcat: Meshcat, path: str = "plan", period: float = 1 / 64
+        self,
+        robot: SimulatedRobot,
+        meshcat: Meshcat,
+        path: str = "plan",
+        period: float = 1 / 64,
     ) -> None:
         super().__init__(robot)
         self._meshcat = meshcat
@@ -54,15 +59,18 @@ class KeypointVisualizer(PlanFollower):
             self._meshcat.SetTransform(path, RigidTransform(p_W), context.get_time())
 
 
-def keypoints(robot: Robot, q: Array) -> Array:
-    """Returns toes FL, FR, RL, RR, withers and hip of a robot, m, shape (..., 6, 3).
+def keypoints(robot: SimulatedRobot, q: Array) -> Array:
+    """Returns contact points, withers and hip of a robot, m, shape (..., 6, 3).
 
     ``q`` is [q_WB as w x y z, p_WB, joints], m and rad, shape (..., 7 + J). Withers and
-    hip lie above the front and rear hip joints.
+    hip lie above the front and rear hip joints, and are of a humanoid chest and pelvis.
     """
-    x = np.abs(robot.p_BHip[:, 0]).mean()
-    trunk = np.array([[x, 0.0, 0.06], [-x, 0.0, 0.06]])
+    if isinstance(robot, Robot):
+        x = np.abs(robot.p_BHip[:, 0]).mean()
+        trunk = np.array([[x, 0.0, 0.06], [-x, 0.0, 0.06]])
+    else:
+        trunk = np.array([[0.0, 0.0, 0.3 * robot.stand_height], [0.0, 0.0, 0.0]])
     trunk = np.broadcast_to(trunk, (*q.shape[:-1], *trunk.shape))
-    p_BK = np.concatenate((robot.toe_positions(q[JOINTS]), trunk), axis=-2)
+    p_BK = np.concatenate((robot.contact_points(q[JOINTS]), trunk), axis=-2)
     turned = quat_rotate(q[ORIENTATION][..., None, :], p_BK)
     return q[POSITION][..., None, :] + turned

@@ -14,7 +14,7 @@ from loco_drake.common.errors import InputError, check_number
 from loco_drake.common.typed_yaml import refuse_repeated_keys
 from loco_drake.control.plan import PLAN_DT, UPDATE_PERIOD
 from loco_drake.models.plant import PlantConfig
-from loco_drake.models.robots import get_robot
+from loco_drake.models.robots import Robot, get_simulated
 from loco_drake.motion.gaits import ANY, gait_index, parse_schedule
 
 # Of a scenario's text: the loader recurses at each bracket, and copies at each alias.
@@ -145,7 +145,7 @@ class Disturbances:
 class Scenario:
     """Everything that defines a diagram and its simulator."""
 
-    robot: str = "go2"  # go2, a1, or a robot's YAML file
+    robot: str = "go2"  # go2, a1, g1, or a robot's YAML file
     plant: PlantConfig = field(default_factory=PlantConfig)
     reference: GeneratedReference | MotionReference | PlanReference = field(
         default_factory=GeneratedReference
@@ -169,7 +169,9 @@ class Scenario:
 
     def check(self) -> None:
         """Raises InputError unless every field is valid."""
-        get_robot(self.robot)
+        robot = get_simulated(self.robot)
+        if not isinstance(robot, Robot):
+            self._check_humanoid(robot.name)
         for part in (self.plant, self.reference, self.steering, self.smoother):
             if not isinstance(part, MotionReference | PlanReference | None):
                 part.check()
@@ -184,6 +186,19 @@ class Scenario:
             )
         period = self.visualization.publish_period
         check_number("The visualization's publish_period", period, 1e-3, 10.0)
+
+    def _check_humanoid(self, name: str) -> None:
+        """Raises InputError unless a robot that is no quadruped can do it."""
+        follows = not isinstance(self.policy, ExternalTargets)
+        if follows and isinstance(self.reference, GeneratedReference):
+            raise InputError(
+                f"Motion is generated for robots with three joints a leg; {name} "
+                "follows a Motion file: name it as the reference."
+            )
+        if self.disturbances != Disturbances():
+            raise InputError(
+                f"Disturbances are of robots with three joints a leg, not of {name}."
+            )
 
 
 def _pickled(config: SimulatorConfig | VisualizationConfig) -> tuple[Any, ...]:

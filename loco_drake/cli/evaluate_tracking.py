@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from loco_drake.cli.evaluation import SimulatedEvaluation, print_by_label
 from loco_drake.cli.options import Policy, TrainedLabels, option
 from loco_drake.cli.output import tracked
-from loco_drake.common.errors import InputError, check_choice
+from loco_drake.common.errors import InputError, check_choice, quoted
 from loco_drake.motion.gaits import any_label, parse_label
 from loco_drake.tracking.randomization import RandomizationConfig
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from loco_drake.models.plant import PlantConfig
     from loco_drake.systems.scenario import Scenario
 
+_REFERENCES = ("generated", "retargeted", "grounded")
+
 
 @dataclass(kw_only=True)
 class EvaluateTracking(SimulatedEvaluation):
@@ -24,10 +26,12 @@ class EvaluateTracking(SimulatedEvaluation):
 
     labels: TrainedLabels = ()
     # What is tracked: generated, during the simulation; retargeted, from stretches of
-    # the recordings; or grounded, from these made to obey physics.
-    reference: Annotated[str, option(metavar="NAME")] = "generated"
+    # the recordings; or grounded, from these made to obey physics; or a Motion file, or
+    # a folder of them, which is all that the humanoid g1 can follow.
+    reference: Annotated[str, option(metavar="NAME|FILE|DIR")] = "generated"
     # Number of seeds, counted up from --seed: each gives an episode of each label; of
-    # recordings, there are at most as many as they are.
+    # recordings, there are at most as many as they are; of Motion files, as many
+    # episodes each, which start at different places.
     seeds: int = 20
     # Duration in s: of each episode, at most that of a recording.
     duration: float = 10.0
@@ -65,9 +69,13 @@ class EvaluateTracking(SimulatedEvaluation):
         from loco_drake.generation.generate import check_duration
 
         super().check()
-        check_choice(
-            "reference", self.reference, ("generated", "retargeted", "grounded")
-        )
+        if self.reference not in _REFERENCES and not self._of_files:
+            raise InputError(
+                f"Unknown reference {quoted(self.reference)}; the choices are "
+                f"{', '.join(_REFERENCES)}, a Motion file or a folder of them."
+            )
+        if self._of_files and self.labels:
+            raise InputError("--labels are not of Motion files, which have their own.")
         check_choice("simulator", self.simulator, ("drake", "mujoco"))
         check_duration(self.duration)
         if self.pushes:
@@ -83,6 +91,23 @@ class EvaluateTracking(SimulatedEvaluation):
             self._mujoco().check()
         elif self.mjcf is not None:
             raise InputError("--mujoco-model is for MuJoCo: add --simulator mujoco.")
+
+    @property
+    def _of_files(self) -> bool:
+        """Whether Motion files are tracked."""
+        return self.reference not in _REFERENCES and Path(self.reference).exists()
+
+    def robots(self) -> list[str]:
+        """Returns the names of the robots; raises InputError if they are unknown."""
+        from loco_drake.models.biped_file import is_biped_file
+
+        if not is_biped_file(self.robot):
+            return super().robots()
+        if not self._of_files or self.simulator != "drake":
+            raise InputError(
+                "A humanoid tracks Motion files in Drake: name them with --reference."
+            )
+        return [self.robot]
 
     def _mujoco(self) -> "MujocoConfig":
         """Returns the configuration of MuJoCo."""
@@ -117,11 +142,11 @@ class EvaluateTracking(SimulatedEvaluation):
         from loco_drake.datasets.segments import read_segments
         from loco_drake.evaluation import tracking_table
         from loco_drake.models.plant import plant_damping
-        from loco_drake.models.robots import get_robot
+        from loco_drake.models.robots import get_simulated
         from loco_drake.models.shipped import policy_path
         from loco_drake.systems import scenario as systems
 
-        robot = get_robot(name)
+        robot = get_simulated(name)
         weights = policy_path(robot, self.policy)
         trained = load_actor(weights, robot).config.labels
         parse = parse_label if self.reference == "generated" else any_label
@@ -131,6 +156,14 @@ class EvaluateTracking(SimulatedEvaluation):
         plant_damping(robot, plant)
         policy = systems.TrainedPolicy(weights=weights)
         scenario = systems.Scenario(robot=robot.definition, plant=plant, policy=policy)
+        if self._of_files:
+            scenario.reference = systems.PlanReference()
+            trials = tracking_table.motion_trials(
+                robot, Path(self.reference), self.seeds, self.duration
+            )
+            grounded = fall_limit(all(trial.ground for trial in trials))
+            scenario.smoother = systems.SmootherConfig(fall=grounded)
+            return scenario, trials
         if self.reference != "generated":
             ground = self.reference == "grounded"
             scenario.reference = systems.PlanReference()
@@ -149,12 +182,15 @@ class EvaluateTracking(SimulatedEvaluation):
         self, name: str, scenario: "Scenario", trials: "list[Trial]"
     ) -> dict[str, Any]:
         """Returns the figures of one robot."""
+        from loco_drake.control.plan import PLAN_DT
         from loco_drake.evaluation.tracking_table import run_trials, summarize
 
         mujoco = self._mujoco() if self.simulator == "mujoco" else None
-        episodes = run_trials(
+        simulated = run_trials(
             scenario, trials, self.executor, self.randomization, mujoco
         )
+        episodes = list(tracked(simulated, f"Simulating {name}", len(trials)))
+        survived = [(episode.samples - 1) * PLAN_DT for episode in episodes]
         return {
             "robot": name,
             "reference": self.reference,
@@ -165,7 +201,8 @@ class EvaluateTracking(SimulatedEvaluation):
             "friction": self.friction,
             "duration_s": self.duration,
             "randomization": asdict(self.randomization),
-            **summarize(list(tracked(episodes, f"Simulating {name}", len(trials)))),
+            **summarize(episodes),
+            **({"survived_s": survived} if self._of_files else {}),
         }
 
     def show(self, name: str, figures: dict[str, Any]) -> int:

@@ -11,7 +11,7 @@ from loco_drake.cli.output import do_all, print_table, say, write_json
 from loco_drake.common.errors import InputError
 
 if TYPE_CHECKING:
-    from loco_drake.models.robots import Robot
+    from loco_drake.models.robots import SimulatedRobot
 
 
 @dataclass(kw_only=True)
@@ -21,7 +21,7 @@ class RobotInspect:
     The exit status is 1 if its motors cannot hold its stance.
     """
 
-    # The robot's YAML file, see docs/own_robot.md.
+    # The robot's YAML file, see docs/own_robot.md and docs/humanoid.md.
     file: Annotated[Path, tyro.conf.Positional, option(metavar="FILE")]
     # Picture to write: the robot in its stance, *.png.
     picture: Annotated[Path | None, option(metavar="FILE"), Output.FILE] = None
@@ -31,7 +31,7 @@ class RobotInspect:
     def run(self) -> int:
         """Checks, prints and writes; returns the exit status."""
         from loco_drake.models.robot_files import is_robot_file
-        from loco_drake.models.robots import get_robot, robot_settings
+        from loco_drake.models.robots import Robot, get_simulated, robot_settings
         from loco_drake.models.standing import stand
 
         if not is_robot_file(str(self.file)):
@@ -40,9 +40,11 @@ class RobotInspect:
             )
         if self.picture is not None and self.picture.suffix != ".png":
             raise InputError(f"--picture must end in .png, not {str(self.picture)!r}.")
-        robot = get_robot(str(self.file))
+        robot = get_simulated(str(self.file))
         settings = robot_settings(self.file)
-        stood = stand(robot)
+        # A humanoid sways for longer.
+        seconds = 2.0 if isinstance(robot, Robot) else 10.0
+        stood = stand(robot, seconds)
         if self.picture is not None:
             _draw(robot, self.picture)
         figures = {
@@ -61,14 +63,14 @@ class RobotInspect:
             print(f"It stands; its trunk sinks by {1000 * stood.sunk:.0f} mm.")
             return 0
         say(
-            f"It does not stand: after 2 s its trunk is {1000 * stood.sunk:.0f} mm "
-            f"lower and tilted by {stood.tilt:.2f} rad; compare gains, effort and "
-            "stance."
+            f"It does not stand: after {seconds:g} s its trunk is "
+            f"{1000 * stood.sunk:.0f} mm lower and tilted by {stood.tilt:.2f} "
+            "rad; compare gains, effort and stance."
         )
         return 1
 
 
-def _draw(robot: "Robot", path: Path) -> None:
+def _draw(robot: "SimulatedRobot", path: Path) -> None:
     """Writes a picture of a robot in its stance."""
     import numpy as np
     from PIL import Image

@@ -36,7 +36,7 @@ from loco_drake.motion.motion_file import load_motion
 
 if TYPE_CHECKING:
     from loco_drake.evaluation.tracking import Rollout
-    from loco_drake.models.robots import Robot
+    from loco_drake.models.robots import SimulatedRobot
     from loco_drake.systems.scenario import Scenario
     from loco_drake.viewing.captions import Track
     from loco_drake.viewing.takes import Scene
@@ -49,7 +49,8 @@ _GENERATED = ("generated", "gpt")  # the latter formerly
 class Simulate:
     """Simulate a robot in Drake that tracks generated motion or a Motion file."""
 
-    # Robot: go2, a1, or a YAML file, see docs/own_robot.md.
+    # Robot: go2, a1, or a YAML file, see docs/own_robot.md; or g1, see
+    # docs/humanoid.md.
     robot: Annotated[str | None, option(metavar="ROBOT|FILE", default="go2")] = None
     gait: Annotated[
         str | None,
@@ -109,11 +110,11 @@ class Simulate:
         from loco_drake.control.plan import PLAN_DT
         from loco_drake.control.state import POSITION
         from loco_drake.evaluation import tracking
-        from loco_drake.models.robots import get_robot
+        from loco_drake.models.robots import get_simulated
         from loco_drake.models.scenery import frame, publish_replay
 
         scenario, duration, motion = self._read()
-        robot = get_robot(scenario.robot)
+        robot = get_simulated(scenario.robot)
         if self.video is not None:
             prepare_video(self.video, duration)
         meshcat = None
@@ -200,7 +201,7 @@ class Simulate:
             InputError: if an option or a field of the scenario is amiss.
         """
         from loco_drake.control.driving import check_command
-        from loco_drake.models.robots import get_robot
+        from loco_drake.models.robots import Robot, get_simulated
         from loco_drake.systems.scenario import (
             GeneratedReference,
             LoadScenario,
@@ -240,6 +241,8 @@ class Simulate:
         scenario.check()
         if self.command is not None:
             check_command(self.command)
+            if not isinstance(get_simulated(scenario.robot), Robot):
+                raise InputError("--command is for robots with three joints a leg.")
             if scenario.steering is None:
                 raise InputError("--command needs a scenario with steering.")
         if not isinstance(scenario.policy, TrainedPolicy):
@@ -263,7 +266,7 @@ class Simulate:
                 "file: add --reference generated."
             )
         motion = load_motion(reference.path)
-        name = get_robot(scenario.robot).name
+        name = get_simulated(scenario.robot).name
         if motion.robot != name:
             raise InputError(
                 f"{reference.path} is a motion of {motion.robot}, not of {name}."
@@ -271,7 +274,7 @@ class Simulate:
         return scenario, min(duration, motion.duration), motion
 
 
-def _scene(robot: "Robot", rollout: "Rollout", track: "Track") -> "Scene":
+def _scene(robot: "SimulatedRobot", rollout: "Rollout", track: "Track") -> "Scene":
     """Returns what a robot did, with its plan's keypoints and what is said of it."""
     from loco_drake.control.state import split
     from loco_drake.motion.motion import FPS

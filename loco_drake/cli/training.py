@@ -101,12 +101,12 @@ def train_policy(command: Any, train: TrainPolicy) -> int:
     Raises:
         InputError: if there are no such references.
     """
-    from loco_drake.models.robots import get_robot
+    from loco_drake.models.robots import get_simulated
     from loco_drake.tracking.references import load_references
 
     if command.references is None:
         raise InputError("--motions must name a folder of Motion files.")
-    robot = get_robot(command.environment.robot)
+    robot = get_simulated(command.environment.robot)
     plans = load_references(robot, command.references)
     with progress_bar() as bar:
         task = bar.add_task(command.NAME, total=command.steps, note="")

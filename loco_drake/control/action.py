@@ -8,9 +8,9 @@ from loco_drake.common.arrays import Array, read_only
 from loco_drake.control.feed_forward import feed_forward_torques, mid_samples
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.state import JOINT_VELOCITIES, JOINTS
-from loco_drake.models.robots import Robot
+from loco_drake.models.simulated import SimulatedRobot
 
-ACTION_SCALE = 0.15  # rad per unit of action: 15 Nm on both robots
+ACTION_SCALE = 0.15  # rad per unit of action: 15 Nm on Go2 and A1
 
 
 def joint_targets(set_points: Array, action: Array) -> Array:
@@ -26,7 +26,7 @@ def joint_targets(set_points: Array, action: Array) -> Array:
 
 
 @lru_cache(maxsize=4)  # A plan is immutable.
-def set_points(robot: Robot, plan: Plan) -> Array:
+def set_points(robot: SimulatedRobot, plan: Plan) -> Array:
     """Returns the PD set-points that track ``plan``, rad, shape (N, J).
 
     Row k is held for the control period that ends at sample k. In it the PD is to
@@ -40,8 +40,8 @@ def set_points(robot: Robot, plan: Plan) -> Array:
     return read_only(plan.q[JOINTS] + ahead / robot.kp)
 
 
-def velocity_gain(robot: Robot) -> Array:
-    """Returns the gain of planned joint velocities, N m s/rad, shape (12,).
+def velocity_gain(robot: SimulatedRobot) -> Array:
+    """Returns the gain of planned joint velocities, N m s/rad, shape (J,).
 
     kd v makes up for the damping of the motors. A set-point is held for a control
     period T and belongs to its end, so it is T / 2 ahead of the joints on average, and

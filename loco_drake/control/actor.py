@@ -19,13 +19,13 @@ from loco_drake.common.arrays import Array, Integers
 from loco_drake.control.action import ACTION_SCALE
 from loco_drake.control.feed_forward import FEED_FORWARD
 from loco_drake.control.observation import (
-    MIRROR_OBSERVATION,
-    MIRROR_OBSERVATION_SIGNS,
-    OBSERVATION_LAYOUT,
-    OBSERVATION_SIZE,
+    LAYOUT,
+    Layout,
+    layout_of,
+    mirrored_layout,
 )
 from loco_drake.control.recovery import RECOVERY, share_of_recovery
-from loco_drake.models.legs import MIRROR_JOINT_SIGNS, MIRROR_JOINTS
+from loco_drake.models.simulated import SimulatedRobot
 from loco_drake.motion.motion import FPS
 
 OBSERVATION_CLIP = 5.0  # standard deviations
@@ -39,8 +39,9 @@ class Mirror:
     """Mirrors arrays and tensors by permuting the last axis and changing signs."""
 
     def __init__(self, order: Integers, signs: Array) -> None:
-        self._order, self._signs = order, signs
-        self._signs_torch = torch.tensor(signs, dtype=torch.float32)
+        # Copies, since torch takes no array that cannot be written.
+        self._order, self._signs = order.copy(), signs.copy()
+        self._signs_torch = torch.tensor(self._signs, dtype=torch.float32)
 
     def __call__(self, values: Values) -> Values:
         """Returns the mirror image of ``values``, of the same shape (..., N)."""
@@ -49,17 +50,24 @@ class Mirror:
         return (values[..., self._order] * self._signs).astype(values.dtype)
 
 
-# Of shape (..., OBSERVATION_SIZE) and (..., 12).
-mirror_observations = Mirror(MIRROR_OBSERVATION, MIRROR_OBSERVATION_SIGNS)
-mirror_actions = Mirror(MIRROR_JOINTS, MIRROR_JOINT_SIGNS)
+def mirrors(layout: Layout) -> tuple[Mirror, Mirror]:
+    """Returns what mirrors observations (..., size) and actions (..., J)."""
+    return (
+        Mirror(layout.mirror, layout.mirror_signs),
+        Mirror(layout.mirror_joints, layout.mirror_joint_signs),
+    )
 
 
-def unprivileged_mask() -> Tensor:
-    """Returns a mask of the observation, 0 where it is privileged, (OBSERVATION_SIZE,).
+# Of robots with three joints a leg, (..., OBSERVATION_SIZE) and (..., 12).
+mirror_observations, mirror_actions = mirrors(LAYOUT)
+
+
+def unprivileged_mask(layout: Layout = LAYOUT) -> Tensor:
+    """Returns a mask of the observation, 0 where it is privileged, (size,).
 
     Multiplying normalized observations by it sets privileged parts to their mean.
     """
-    masks = ([name not in PRIVILEGED] * size for name, size in OBSERVATION_LAYOUT)
+    masks = ([name not in PRIVILEGED] * size for name, size in layout.parts)
     return torch.tensor(list(chain(*masks)), dtype=torch.float32)
 
 
@@ -73,8 +81,14 @@ class ActorConfig:
     hidden: list[int] = field(default_factory=lambda: [256, 128])
     # Names and sizes of the parts of the observation.
     observation_layout: list[list[Any]] = field(
-        default_factory=lambda: [list(part) for part in OBSERVATION_LAYOUT]
+        default_factory=lambda: [list(part) for part in LAYOUT.parts]
     )
+    # Number, from 1, of the joint whose mirror image each joint is, and the signs of
+    # the angles there.
+    mirror_joints: list[int] = field(
+        default_factory=lambda: (LAYOUT.mirror_joints + 1).tolist()
+    )
+    mirror_signs: list[float] = field(default_factory=LAYOUT.mirror_joint_signs.tolist)
     action_scale: float = ACTION_SCALE  # rad per unit of action
     rate: float = FPS  # actions per second
     # The feed-forward that the actions add to.
@@ -86,6 +100,26 @@ class ActorConfig:
     history: int | None = None
     # Thresholds from which on a second network acts, see recovery.py; None for none.
     recovery: list[float] | None = None
+
+    @property
+    def layout(self) -> Layout:
+        """The layout of the observations; raises ValueError if there can be none."""
+        order = tuple(k - 1 for k in self.mirror_joints)
+        if sorted(order) != list(range(len(self.mirror_signs))):
+            raise ValueError("no mirroring of joints")
+        return mirrored_layout(order, tuple(self.mirror_signs))
+
+
+def config_for(robot: SimulatedRobot, **others: Any) -> ActorConfig:
+    """Returns the configuration of a policy of ``robot``."""
+    layout = layout_of(robot)
+    return ActorConfig(
+        robot=robot.name,
+        observation_layout=[list(part) for part in layout.parts],
+        mirror_joints=(layout.mirror_joints + 1).tolist(),
+        mirror_signs=layout.mirror_joint_signs.tolist(),
+        **others,
+    )
 
 
 class Actor(nn.Module):
@@ -104,17 +138,20 @@ class Actor(nn.Module):
     def __init__(self, config: ActorConfig) -> None:
         super().__init__()
         self.config = config
-        self.register_buffer("mean", torch.zeros(OBSERVATION_SIZE))
-        self.register_buffer("variance", torch.ones(OBSERVATION_SIZE))
-        self.register_buffer("mask", unprivileged_mask(), persistent=False)
-        self.layers = make_layers(OBSERVATION_SIZE, config.hidden, 12)
+        self.layout = layout = config.layout
+        self._mirrors = mirrors(layout)
+        joints = len(config.mirror_joints)
+        self.register_buffer("mean", torch.zeros(layout.size))
+        self.register_buffer("variance", torch.ones(layout.size))
+        self.register_buffer("mask", unprivileged_mask(layout), persistent=False)
+        self.layers = make_layers(layout.size, config.hidden, joints)
         if config.recovery is not None:
             if len(config.recovery) != len(RECOVERY) or min(config.recovery) <= 0:
                 raise ValueError("no thresholds of a recovery")
-            self.recovery = make_layers(OBSERVATION_SIZE, config.hidden, 12)
+            self.recovery = make_layers(layout.size, config.hidden, joints)
 
     def forward(self, observation: Tensor) -> Tensor:
-        """Returns actions (..., 12) for observations (..., OBSERVATION_SIZE)."""
+        """Returns actions (..., J) for observations (..., size of the layout)."""
         normal = self._normalized(observation)
         if not self.config.privileged:
             normal = normal * self.mask
@@ -132,17 +169,18 @@ class Actor(nn.Module):
         return normal.clamp(-OBSERVATION_CLIP, OBSERVATION_CLIP)
 
     def _act(self, observation: Tensor, normal: Tensor) -> Tensor:
-        action = _symmetric(self.layers, normal)
+        action = self._symmetric(self.layers, normal)
         if self.config.recovery is None:
             return action
-        share = share_of_recovery(observation, self.config.recovery)
-        return torch.lerp(action, _symmetric(self.recovery, normal), share)
+        share = share_of_recovery(observation, self.config.recovery, self.layout.places)
+        return torch.lerp(action, self._symmetric(self.recovery, normal), share)
 
-
-def _symmetric(layers: nn.Module, normal: Tensor) -> Tensor:
-    """Returns actions that are mirrored with the observations."""
-    image = layers(mirror_observations(normal))
-    return (layers(normal) + mirror_actions(image)) / 2
+    def _symmetric(self, layers: nn.Module, normal: Tensor) -> Tensor:
+        """Returns actions that are mirrored with the observations."""
+        mirror_observations, mirror_actions = self._mirrors
+        image = layers(mirror_observations(normal))
+        action: Tensor = (layers(normal) + mirror_actions(image)) / 2
+        return action
 
 
 def make_layers(width: int, hidden: list[int], outputs: int) -> nn.Sequential:

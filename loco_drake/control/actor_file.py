@@ -17,9 +17,9 @@ from loco_drake.common.weights import (
     read_config,
     save_weights,
 )
-from loco_drake.control.actor import Actor, ActorConfig
+from loco_drake.control.actor import Actor, ActorConfig, config_for
 from loco_drake.control.history_actor import HistoryActor
-from loco_drake.models.robots import Robot
+from loco_drake.models.simulated import SimulatedRobot
 
 KIND = "policy"
 # The feed-forward of policies whose files do not name it: equal shares of the weight.
@@ -102,7 +102,7 @@ def read_actor(path: Path) -> tuple[Actor, dict[str, Tensor]]:
     return build_network(path, make_actor, config, own).eval(), learner
 
 
-def load_actor(path: Path, robot: Robot) -> Actor:
+def load_actor(path: Path, robot: SimulatedRobot) -> Actor:
     """Reads a policy for ``robot``.
 
     Raises:
@@ -113,7 +113,7 @@ def load_actor(path: Path, robot: Robot) -> Actor:
     header = load_weights(path, KIND)[1]
     config = read_actor_config(header, path)
     free = {name: getattr(config, name) for name in _FREE}
-    expected = ActorConfig(robot=robot.name, **free)
+    expected = config_for(robot, **free)
     for name, value in asdict(expected).items():
         if (trained := getattr(config, name)) != value:
             what = name.replace("_", " ")

@@ -8,7 +8,7 @@ from loco_drake.common.rotations import quat_to_matrix
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.state import JOINTS, ORIENTATION, VELOCITY, unit_base
 from loco_drake.models.dynamics import inverse_dynamics
-from loco_drake.models.robots import Robot
+from loco_drake.models.simulated import SimulatedRobot
 
 # What it is called in the files of policies, which were trained on top of it.
 FEED_FORWARD = "inverse dynamics"
@@ -21,7 +21,7 @@ MOMENT_WEIGHT = 5.0
 DAMPING = 0.1
 
 
-def feed_forward_torques(robot: Robot, plan: Plan) -> Array:
+def feed_forward_torques(robot: SimulatedRobot, plan: Plan) -> Array:
     """Returns mean joint torques in the periods that end at the samples, (N, J), N m.
 
     They are the inverse dynamics of the whole robot between two samples, in contact
@@ -35,13 +35,16 @@ def feed_forward_torques(robot: Robot, plan: Plan) -> Array:
     q, v, vdot = mid_samples(plan)
     needed = inverse_dynamics(robot, q, v, vdot)
     R_WB = quat_to_matrix(q[ORIENTATION])
-    # Positions and Jacobians of the toes relative to the base, in the world.
-    p_BF_W = np.einsum("nij,nlj->nli", R_WB, robot.toe_positions(q[JOINTS]))
-    J = np.einsum("nij,nljk->nlik", R_WB, robot.toe_jacobians(q[JOINTS]))
+    # Positions and Jacobians of the contacts relative to the base, in the world.
+    p_BF_W = np.einsum("nij,nlj->nli", R_WB, robot.contact_points(q[JOINTS]))
+    J = np.einsum("nij,nljk->nlik", R_WB, robot.contact_jacobians(q[JOINTS]))
     load = robot.mass * (GRAVITY + vdot[VELOCITY][:, 2])
     f = stance_forces(needed[:, :6], p_BF_W, plan.contacts, load)
     f = _admissible(f, MAX_LOAD * GRAVITY * robot.mass)
-    support = np.einsum("nlik,nli->nlk", J, f).reshape(len(plan), -1)
+    support = np.zeros_like(needed[:, 6:])
+    of_contacts = np.einsum("nlik,nli->nlk", J, f)
+    for k, joints in enumerate(robot.contact_joints):
+        support[:, joints] += of_contacts[:, k]
     return needed[:, 6:] - support
 
 

@@ -48,6 +48,8 @@ class HistoryActor(Actor):
         super().__init__(config)
         if config.history is None or config.privileged:
             raise ValueError("a history is for a policy that is not privileged")
+        if self.layout.size != OBSERVATION_SIZE:
+            raise ValueError("a history is of robots with three joints a leg")
         self.memory_size = memory_size(config.history)
         self.legs = LegOdometry(get_robot(config.robot))
         frames = config.history * FRAME_SIZE + (config.history + 1) * _LEG_FEATURES

@@ -11,7 +11,7 @@ from loco_drake.common.errors import InputError
 from loco_drake.common.immutable import Immutable
 from loco_drake.common.rotations import quat_conjugate, quat_rotate, yaw_of, yaw_quat
 from loco_drake.control.state import JOINTS, ORIENTATION, POSITION, unit_base
-from loco_drake.models.robots import Robot
+from loco_drake.models.simulated import SimulatedRobot
 from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.motion.motion import FPS, Motion
 
@@ -42,8 +42,8 @@ class Plan(Immutable):
     q: Array  # positions, m and rad, shape (N, 7 + J)
     v: Array  # velocities, m/s and rad/s, shape (N, 6 + J)
     vdot: Array  # time derivatives of v, shape (N, 6 + J)
-    p_WF: Array  # centres of the toe spheres in m, shape (N, 4, 3)
-    contacts: Bools  # whether each foot should be on the ground, shape (N, 4)
+    p_WF: Array  # the robot's contact points in m, shape (N, 4, 3)
+    contacts: Bools  # whether each should be on the ground, shape (N, 4)
     labels: Integers  # row of motion.gaits.ONE_HOT, shape (N,)
     # Time in the motion before smoothing, s, shape (N,); the smoother slows this clock
     # down where the robot could not keep up.
@@ -128,7 +128,7 @@ class Plan(Immutable):
 
 
 def make_plan(
-    robot: Robot,
+    robot: SimulatedRobot,
     *,
     q: Array,
     v: Array,
@@ -138,8 +138,8 @@ def make_plan(
     path_time: Array | None = None,
     open_ended: bool = False,
 ) -> Plan:
-    """Returns a Plan; computes toes from the joints and accelerations from ``v``."""
-    p_BF = robot.toe_positions(q[JOINTS])
+    """Returns a Plan; contact points follow from joints, accelerations from ``v``."""
+    p_BF = robot.contact_points(q[JOINTS])
     p_WF = q[POSITION][:, None] + quat_rotate(q[ORIENTATION][:, None], p_BF)
     if path_time is None:
         path_time = PLAN_DT * np.arange(len(q), dtype=np.float64)
@@ -147,7 +147,9 @@ def make_plan(
     return Plan(start_time, q, v, vdot, p_WF, contacts, labels, path_time, open_ended)
 
 
-def plan_from_motion(robot: Robot, motion: Motion, start_time: float = 0.0) -> Plan:
+def plan_from_motion(
+    robot: SimulatedRobot, motion: Motion, start_time: float = 0.0
+) -> Plan:
     """Returns ``motion`` as a Plan of ``robot``.
 
     Raises:
@@ -206,7 +208,7 @@ def first_change(before: Plan, after: Plan) -> float:
     return float(after.path_time[-1]) + PLAN_DT
 
 
-def standing_plan(robot: Robot, start_time: float = 0.0) -> Plan:
+def standing_plan(robot: SimulatedRobot, start_time: float = 0.0) -> Plan:
     """Returns a plan to stand still, the default value of ports."""
     q = np.concatenate(([1, 0, 0, 0, 0, 0, robot.stand_height], robot.stand_joints))
     return make_plan(

@@ -4,6 +4,8 @@ One network follows the plan exactly, a second one returns to it after a push. A
 network that learns both does each of them worse.
 """
 
+from collections.abc import Mapping
+
 import torch
 from torch import Tensor
 
@@ -13,12 +15,13 @@ from loco_drake.control.plan import PLAN_DT
 # At which velocity (m/s) and distance (m) in the plane, and at which angle (rad), the
 # second network begins to act.
 RECOVERY = [0.25, 0.12, 0.25]
-_V_WB_H, _W_WB_B = PLACES["v_WB_H"], PLACES["w_WB_B"]
-# Of the plan's next sample.
-_V, _P, _R = (PLACES[f"plan_{name}"].start for name in ("v_H", "p_H", "R_B"))
 
 
-def share_of_recovery(observation: Tensor, recovery: list[float]) -> Tensor:
+def share_of_recovery(
+    observation: Tensor,
+    recovery: list[float],
+    places: Mapping[str, slice] = PLACES,
+) -> Tensor:
     """Returns the share of the second network in the action, 0 to 1, shape (..., 1).
 
     With the errors e of the base at the plan's next sample, should the robot keep its
@@ -31,11 +34,16 @@ def share_of_recovery(observation: Tensor, recovery: list[float]) -> Tensor:
     Args:
         observation: as of :func:`.observe`, not normalized, shape (..., N).
         recovery: the thresholds, as RECOVERY.
+        places: where the parts of the observation are.
     """
-    v, w = observation[..., _V_WB_H], observation[..., _W_WB_B]
-    off_v = observation[..., _V : _V + 2] - v[..., :2]
-    off_p = observation[..., _P : _P + 2] - PLAN_DT * v[..., :2]
-    off_R = observation[..., _R : _R + 3] - PLAN_DT * w
+    # Of the plan, that of the next sample.
+    v, w, plan_v, plan_p, plan_R = (
+        observation[..., places[name]]
+        for name in ("v_WB_H", "w_WB_B", "plan_v_H", "plan_p_H", "plan_R_B")
+    )
+    off_v = plan_v[..., :2] - v[..., :2]
+    off_p = plan_p[..., :2] - PLAN_DT * v[..., :2]
+    off_R = plan_R[..., :3] - PLAN_DT * w
     squares = [
         (off / threshold).square().sum(dim=-1, keepdim=True)
         for off, threshold in zip((off_v, off_p, off_R), recovery, strict=True)

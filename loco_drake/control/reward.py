@@ -13,43 +13,46 @@ from loco_drake.control.state import (
     VELOCITY,
     split,
 )
-from loco_drake.models.robots import Robot
+from loco_drake.models.simulated import SimulatedRobot
 
 # Terms and weights of Peng et al. 2020, "Learning agile robotic locomotion skills by
 # imitating animals", Section IV-B.
 REWARD_TERMS = ("joints", "joint_velocities", "toes", "base_pose", "base_velocity")
 REWARD_WEIGHTS = np.array([0.5, 0.05, 0.2, 0.15, 0.1])
+_JOINTS = 12  # of the robot whose errors are summed up
 
 
 def reward_terms(
-    robot: Robot, plan_state: Array, plan_p_BoF_H: Array, state: Array
+    robot: SimulatedRobot, plan_state: Array, plan_p_BoF_H: Array, state: Array
 ) -> Array:
     """Returns the five weighted terms of the reward, (..., 5); their sum is at most 1.
 
-    With e the sum of squared errors in rad, m and s:
+    With e the sum of squared errors in rad, m and s, over the joints twelve times the
+    mean, which of a robot with twelve joints is the sum:
 
     - joints: .5 exp(-5 e)
     - joint velocities: .05 exp(-.1 e)
-    - toes: .2 exp(-40 e), sphere centres relative to the base, each in the heading
+    - toes: .2 exp(-40 e), contact points relative to the base, each in the heading
       frame of its own base
     - base pose: .15 exp(-20 e_p - 10 e_R), p_WB in the world, the rotation in so(3)
     - base velocity: .1 exp(-2 e_v - .2 e_w), in the world
 
-    States (..., 37) are [q, v] with unit quaternions, ``plan_p_BoF_H`` (..., 4, 3) is
-    as :attr:`Plan.p_BoF_H`.
+    States (..., 13 + 2 J) are [q, v] with unit quaternions, ``plan_p_BoF_H`` (..., 4,
+    3) is as :attr:`Plan.p_BoF_H`.
     """
     (q, v), (plan_q, plan_v) = split(state), split(plan_state)
     R_WB = quat_to_matrix(q[ORIENTATION])
-    p_BoF_H = robot.toe_positions(q[JOINTS]) @ (
+    p_BoF_H = robot.contact_points(q[JOINTS]) @ (
         np.swapaxes(R_WB, -1, -2) @ heading_matrix(R_WB)
     )
     gap = q - plan_q
     turn = quat_error(q[ORIENTATION], plan_q[ORIENTATION])
     velocity = v - plan_v
     toes = p_BoF_H - plan_p_BoF_H
+    share = _JOINTS / len(robot.joint_names)
     exponents = (
-        5 * _squares(gap[JOINTS]),
-        0.1 * _squares(velocity[JOINT_VELOCITIES]),
+        5 * share * _squares(gap[JOINTS]),
+        0.1 * share * _squares(velocity[JOINT_VELOCITIES]),
         40 * _squares(toes.reshape(*toes.shape[:-2], 12)),
         20 * _squares(gap[POSITION]) + 10 * _squares(turn),
         2 * _squares(velocity[VELOCITY]) + 0.2 * _squares(velocity[ANGULAR_VELOCITY]),

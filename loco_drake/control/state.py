@@ -13,7 +13,7 @@ import numpy as np
 from loco_drake.common.arrays import Array, Bools
 from loco_drake.common.errors import check_bounds
 from loco_drake.common.rotations import quat_to_matrix
-from loco_drake.models.robots import Robot
+from loco_drake.models.simulated import SimulatedRobot
 
 # Of q.
 ORIENTATION = np.s_[..., :4]
@@ -55,10 +55,10 @@ def unit_base(state: Array) -> Array:
     return result
 
 
-def has_fallen(robot: Robot, q: Array) -> Bools:
+def has_fallen(robot: SimulatedRobot, q: Array) -> Bools:
     """Returns whether the trunk touches the ground or tilts by more than 60 degrees.
 
-    The result has one bool, shape (...), for each row of positions q, shape (..., 19).
+    The result has one bool, shape (...), for each row of positions q, (..., 7 + J).
     """
     # The world's z axis in the trunk's frame.
     z_B = quat_to_matrix(q[ORIENTATION])[..., 2, :]
@@ -89,7 +89,7 @@ class TerminationConfig:
     def exceeded(self, state: Array, plan_state: Array) -> Bools:
         """Returns whether each robot is too far from its plan to come back, (...).
 
-        Both states are [q, v], shape (..., 37).
+        Both states are [q, v], shape (..., 13 + 2 J).
         """
         gap = np.linalg.norm(state[POSITION] - plan_state[POSITION], axis=-1)
         # A turn by an angle a takes a unit quaternion to one whose product with it is

@@ -26,7 +26,7 @@ from loco_drake.control.state import (
     VELOCITY,
     split,
 )
-from loco_drake.models.robots import Robot
+from loco_drake.models.simulated import SimulatedRobot
 
 MAX_SLOPE = 30.0  # degrees
 MAX_ROUGHNESS = 0.1  # m
@@ -84,15 +84,15 @@ class Terrain(Immutable):
         return height, gradient
 
     def over_ground(self, state: Array) -> Array:
-        """Returns a state [q, v] in the world, (37,), as over the ground."""
+        """Returns a state [q, v] in the world, (13 + 2 J,), as over the ground."""
         return self._raised(state, -1.0)
 
     def in_world(self, state: Array) -> Array:
-        """Returns a state over the ground, (37,), as in the world."""
+        """Returns a state over the ground, (13 + 2 J,), as in the world."""
         return self._raised(state, 1.0)
 
-    def placed(self, robot: Robot, state: Array) -> Array:
-        """Returns a state over the ground, (37,), of a robot that stands on the slope.
+    def placed(self, robot: SimulatedRobot, state: Array) -> Array:
+        """Returns a state over the ground, (13 + 2 J,), of a robot on the slope.
 
         The robot of ``state``, which is made for level ground, is turned with the slope
         and moves along it, at the same distance from the plane; on bumps it is raised
@@ -150,8 +150,8 @@ def slope_gradient(degrees: float, direction: float) -> Array:
     return np.asarray(rise * np.array([np.cos(direction), np.sin(direction)]))
 
 
-def toes_in_world(robot: Robot, q: Array) -> Array:
-    """Returns the centres of the toe spheres, m, (4, 3), of positions q, (19,)."""
+def toes_in_world(robot: SimulatedRobot, q: Array) -> Array:
+    """Returns the contact points, m, (4, 3), of positions q, (7 + J,)."""
     return np.asarray(
-        q[POSITION] + quat_rotate(q[ORIENTATION], robot.toe_positions(q[JOINTS]))
+        q[POSITION] + quat_rotate(q[ORIENTATION], robot.contact_points(q[JOINTS]))
     )

@@ -34,7 +34,7 @@ from loco_drake.control.state import (
     has_fallen,
     split,
 )
-from loco_drake.models.robots import Robot
+from loco_drake.models.simulated import SimulatedRobot
 from loco_drake.motion.gaits import ROW_LABELS, GaitLabel
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.quality import stance_slip_speeds
@@ -57,10 +57,10 @@ _LOGGED = ("state", "plan_state", "path_time", "desired_state", "reward_terms")
 class Rollout:
     """The record of a simulation."""
 
-    state: Array  # the plant's [q, v] at each sample, shape (N + 1, 37)
+    state: Array  # the plant's [q, v] at each sample, shape (N + 1, 13 + 2 J)
     plan_state: Array  # the same of the plan
     path_time: Array  # seconds of unsmoothed motion that have passed, shape (N + 1,)
-    desired_joints: Array  # set-points of the PD in rad, shape (N + 1, 12)
+    desired_joints: Array  # set-points of the PD in rad, shape (N + 1, J)
     reward: Array  # of each sample, shape (N + 1,); that of the first is not counted
     steps: int  # how many steps were to be made; more than N if the robot fell
     fell: bool  # whether it did
@@ -160,7 +160,7 @@ class Recorder:
             state=state,
             plan_state=plan_state,
             path_time=path_time[:, 0],
-            desired_joints=desired_state[:, :12],
+            desired_joints=desired_state[:, : desired_state.shape[1] // 2],
             reward=reward_terms.sum(axis=1),
             steps=steps,
             fell=self.fell,
@@ -239,14 +239,14 @@ def speed(rollout: Rollout) -> float:
 
 
 def forward_speeds(state: Array) -> Array:
-    """Returns the base's velocity along its heading, m/s, (N,), of [q, v], (N, 37)."""
+    """Returns velocities of the base along its heading, m/s, (N,), of states (N, n)."""
     q, v = split(state)
     yaw, v = yaw_of(q[ORIENTATION]), v[VELOCITY]
     forward: Array = v[:, 0] * np.cos(yaw) + v[:, 1] * np.sin(yaw)
     return forward
 
 
-def slip_speeds(rollout: Rollout, robot: Robot) -> Array:
+def slip_speeds(rollout: Rollout, robot: SimulatedRobot) -> Array:
     """Horizontal speeds of the simulated toes in stance, m/s, shape (M,).
 
     See :func:`loco_drake.motion.quality.stance_slip_speeds`.
@@ -257,11 +257,13 @@ def slip_speeds(rollout: Rollout, robot: Robot) -> Array:
     return stance_slip_speeds(p_WF, robot.foot_radius, FPS)
 
 
-def effort_metrics(rollout: Rollout, robot: Robot, damping: Array) -> dict[str, float]:
+def effort_metrics(
+    rollout: Rollout, robot: SimulatedRobot, damping: Array
+) -> dict[str, float]:
     """Returns metrics of the actuators by name.
 
     With the torque of the PD, tau = kp (q_d - q) - d v, clipped at the effort limit,
-    and the ``damping`` d of the PD in the plant, N m s/rad, shape (12,):
+    and the ``damping`` d of the PD in the plant, N m s/rad, shape (J,):
 
     - torque_saturation: share of samples and joints at the effort limit
     - speed_saturation: share of samples and joints at or beyond the speed limit

@@ -17,13 +17,14 @@ made of its episodes':
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from loco_drake.common.arrays import Array
 from loco_drake.common.errors import InputError
-from loco_drake.control.plan import PLAN_DT, plan_from_motion
+from loco_drake.control.plan import PLAN_DT, Plan, plan_from_motion
 from loco_drake.datasets.segments import Segment, select_labels
 from loco_drake.engine.executor import Executor
 from loco_drake.engine.local import LOCAL
@@ -37,12 +38,14 @@ from loco_drake.evaluation.tracking import (
 )
 from loco_drake.models.mujoco_plant import MujocoConfig
 from loco_drake.models.plant import plant_damping
-from loco_drake.models.robots import get_robot
+from loco_drake.models.robots import Robot, SimulatedRobot, get_simulated
 from loco_drake.motion.gaits import any_label
+from loco_drake.motion.motion_file import load_motion
 from loco_drake.retargeting.retarget import SegmentRetargeter
 from loco_drake.retargeting.scaling import Variant
 from loco_drake.systems.scenario import PlanReference, Scenario
 from loco_drake.tracking.randomization import RandomizationConfig
+from loco_drake.tracking.references import check_robot, read_motions
 
 _POOLED = ("joint_rmse_rad", "base_position_rmse_m", "base_orientation_rmse_rad")
 _MEANS = (
@@ -64,6 +67,14 @@ class Trial:
     # The recording to follow; None to follow the generator.
     segment: Segment | None = None
     ground: bool = False  # whether that recording's motion is made to obey physics
+    # Or the Motion file to follow, from this sample on.
+    motion: Path | None = None
+    start: int = 0
+
+    @property
+    def generated(self) -> bool:
+        """Whether it follows the generator."""
+        return self.segment is None and self.motion is None
 
 
 @dataclass(frozen=True)
@@ -87,7 +98,7 @@ class _Runner:
         randomization: RandomizationConfig,
         mujoco: MujocoConfig | None,
     ) -> None:
-        self._robot = get_robot(scenario.robot)
+        self._robot = get_simulated(scenario.robot)
         self._randomization = randomization
         self._recorder: Recorder | MujocoRecorder
         if mujoco is None:
@@ -96,10 +107,12 @@ class _Runner:
         else:
             self._damping = self._robot.kd
             self._recorder = MujocoRecorder(scenario, mujoco)
-        self._retargeters = {
-            ground: SegmentRetargeter(self._robot, variant=Variant(ground=ground))
-            for ground in (False, True)
-        }
+        self._retargeters = {}
+        if isinstance(self._robot, Robot):
+            self._retargeters = {
+                ground: SegmentRetargeter(self._robot, variant=Variant(ground=ground))
+                for ground in (False, True)
+            }
         # The first step sets up torch.
         self._recorder.start()
         self._recorder.run(PLAN_DT)
@@ -111,10 +124,10 @@ class _Runner:
         if not self._randomization.is_off:
             domain = self._randomization.draw(self._robot, random, 0.0, duration)
             episode["domain"] = domain
-        if trial.segment is None:
+        if trial.generated:
             self._recorder.start(gait=trial.label, seed=trial.seed, **episode)
         else:
-            plan = self._plan(trial.segment, trial.ground)
+            plan = self._plan(trial)
             duration = min(duration, plan.end_time)
             self._recorder.start(plan=plan, **episode)
         rollout, wall = self._recorder.run(duration)
@@ -128,8 +141,13 @@ class _Runner:
             wall=wall,
         )
 
-    def _plan(self, segment: Segment, ground: bool) -> Any:
-        result = self._retargeters[ground](segment)
+    def _plan(self, trial: Trial) -> Plan:
+        if trial.motion is not None:
+            motion = load_motion(trial.motion)
+            return plan_from_motion(self._robot, motion.slice(trial.start, len(motion)))
+        segment = trial.segment
+        assert segment is not None
+        result = self._retargeters[trial.ground](segment)
         if isinstance(result, str):
             raise InputError(f"{segment.name} cannot be retargeted: {result}")
         return plan_from_motion(self._robot, result[1])
@@ -165,6 +183,38 @@ def retargeted_trials(
     return trials
 
 
+def motion_trials(
+    robot: SimulatedRobot, folder: Path, count: int, duration: float
+) -> list[Trial]:
+    """Returns ``count`` trials of each Motion file in a folder, or of one file.
+
+    They start at places of the motion that are evenly spread and leave ``duration`` s,
+    where it is that long; otherwise, up to its middle.
+
+    Raises:
+        InputError: as :func:`.references.read_motions`, or if the file is of another
+            robot.
+    """
+    if folder.is_file():
+        motions = {folder: load_motion(folder)}
+        check_robot(robot, motions)
+    else:
+        motions = read_motions(robot, folder)
+    trials = []
+    for path, motion in motions.items():
+        last = len(motion) - 1 - round(duration / PLAN_DT)
+        last = last if last >= 0 else (len(motion) - 1) // 2
+        starts = np.linspace(0, last, count + 1)[:count].round().astype(int)
+        same = Trial(
+            str(motion.label), 0, duration, ground=motion.grounded, motion=path
+        )
+        trials += [
+            replace(same, seed=seed, start=int(start))
+            for seed, start in enumerate(starts)
+        ]
+    return trials
+
+
 def run_trials(
     scenario: Scenario,
     trials: Sequence[Trial],
@@ -176,17 +226,17 @@ def run_trials(
 
     Args:
         scenario: scenario with a generated reference, or a PlanReference if the trials
-            have segments.
+            have segments or motions.
         trials: trials, all of one kind.
         executor: simulates the trials.
         randomization: distribution of each trial's world, by its label and seed.
         mujoco: simulates in MuJoCo, where nothing is randomized, instead of Drake.
     """
     randomization = randomization or RandomizationConfig()
-    randomization.check(get_robot(scenario.robot), scenario.plant)
+    randomization.check(get_simulated(scenario.robot), scenario.plant)
     scenario = replace(scenario, disturbances=randomization.disturbances)
     recorded = isinstance(scenario.reference, PlanReference)
-    if any((trial.segment is not None) != recorded for trial in trials):
+    if any(trial.generated == recorded for trial in trials):
         raise ValueError("the trials are not of the scenario's kind of reference")
     if mujoco is not None and not randomization.is_off:
         raise ValueError("worlds are randomized in Drake only")

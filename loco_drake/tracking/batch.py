@@ -9,7 +9,7 @@ from loco_drake.control.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.reward import reward_terms
 from loco_drake.control.state import POSITION, has_fallen, split, unit_base
-from loco_drake.models.robots import get_robot
+from loco_drake.models.robots import get_simulated
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.physics import OwnWorld, SharedWorld
 
@@ -29,7 +29,7 @@ class TrackingBatch:
     ) -> None:
         self._plans = plans
         self._config = config
-        self._robot = get_robot(config.robot)
+        self._robot = get_simulated(config.robot)
         config.randomization.check(self._robot, config.plant)
         self._worlds: list[SharedWorld] | list[OwnWorld] = (
             [OwnWorld(config) for _ in range(count)]
@@ -53,12 +53,13 @@ class TrackingBatch:
         # Of its last step, for distance, falls and actions.
         self.penalty = np.zeros(count)
         self._last = np.zeros(count, dtype=np.int64)
-        self._state = np.zeros((count, 37))
-        self._action = np.zeros((count, 12))
+        joints = len(self._robot.joint_names)
+        self._state = np.zeros((count, 13 + 2 * joints))
+        self._action = np.zeros((count, joints))
 
     @property
     def states(self) -> Array:
-        """The robots' states [q, v], a copy of shape (B, 37)."""
+        """The robots' states [q, v], a copy of shape (B, 13 + 2 J)."""
         return self._state.copy()
 
     def reset(
@@ -95,7 +96,7 @@ class TrackingBatch:
     def step(
         self, actions: NDArray[np.floating]
     ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
-        """Advances every robot by one control period, given actions (B, 12).
+        """Advances every robot by one control period, given actions (B, J).
 
         Returns the reward's terms (B, 5), who terminated, and who is truncated, (B,).
         """
@@ -120,7 +121,7 @@ class TrackingBatch:
     def observe(
         self, robots: NDArray[np.int64] | slice = slice(None), *, exact: bool = False
     ) -> NDArray[np.float32]:
-        """Returns observations (B, OBSERVATION_SIZE), or those of some robots.
+        """Returns observations (B, size of the Layout), or those of some robots.
 
         They are those of the measured state, or if ``exact`` of the true one.
         """

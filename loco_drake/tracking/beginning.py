@@ -18,14 +18,13 @@ from loco_drake.common.run_folder import Checkpoint
 from loco_drake.common.weights import kind_of, load_into
 from loco_drake.control.actor import Actor, ActorConfig
 from loco_drake.control.actor_file import KIND, read_actor, save_actor
-from loco_drake.control.observation import OBSERVATION_LAYOUT
+from loco_drake.control.observation import LAYOUT, Layout
 from loco_drake.tracking.joining import joined, recovery_of
 from loco_drake.tracking.ppo import AdaptivePPO, actor_layers, export_actor
 
 NAME = "tracker"
 # Beside a checkpoint: what acts far from the plan, which the training leaves as it is.
 RECOVERY = "recovery.safetensors"
-LAYOUT = [list(part) for part in OBSERVATION_LAYOUT]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +33,7 @@ class Beginning:
 
     path: Path  # where they were read
     networks: dict[str, Tensor]  # state dict of ppo.SymmetricPolicy
-    mean: Array  # of the observations, shape (OBSERVATION_SIZE,)
+    mean: Array  # of the observations, shape (size,)
     variance: Array  # of the same shape
     count: float  # number of observations behind both
     rate: float  # learning rate of the actor
@@ -76,26 +75,29 @@ def of_checkpoint(saved: Checkpoint) -> Beginning:
         )
 
 
-def read_beginning(path: Path, hidden: list[int]) -> Beginning:
+def read_beginning(path: Path, hidden: list[int], layout: Layout = LAYOUT) -> Beginning:
     """Reads a checkpoint or a policy file whose networks have the widths ``hidden``.
+
+    Its observations must have the layout, by default that of three joints a leg.
 
     Raises:
         InputError: if the file is missing, damaged, of something else, or a policy
             without its critic; or if widths or observation are others.
     """
     if kind_of(path) == KIND:
-        beginning, own, layout = _of_policy(path)
+        beginning, own, parts = _of_policy(path)
     else:
         saved = run_folder.read_checkpoint(path, NAME)
         with run_folder.sound(path):
-            own, layout = saved.run["hidden"], saved.run["observation_layout"]
+            own, parts = saved.run["hidden"], saved.run["observation_layout"]
         beginning = of_checkpoint(saved)
         beside = path.with_name(RECOVERY)
         if beside.is_file():
             beginning = replace(beginning, recovery=read_actor(beside)[0])
     if own != hidden:
         raise InputError(f"{path} is of networks with --hidden {own}, not {hidden}.")
-    if (layout or LAYOUT) != LAYOUT:
+    wanted = [list(part) for part in layout.parts]
+    if (parts or wanted) != wanted:
         raise InputError(f"{path} is of another observation layout.")
     return beginning
 

@@ -19,7 +19,7 @@ from loco_drake.control.state import (
     split,
 )
 from loco_drake.models.plant import PlantConfig, plant_damping
-from loco_drake.models.robots import get_robot
+from loco_drake.models.robots import get_simulated
 from loco_drake.tracking.randomization import RandomizationConfig
 
 Array = NDArray[np.float64]
@@ -51,8 +51,8 @@ class ResetNoise:
         v[ANGULAR_VELOCITY] = quat_rotate(turn, v[ANGULAR_VELOCITY])
         v[VELOCITY] = quat_rotate(turn, v[VELOCITY])
         q[POSITION][:2] += self.position * random.standard_normal(2)
-        q[JOINTS] += self.joints * random.standard_normal(12)
-        v += self.velocities * random.standard_normal(18)
+        q[JOINTS] += self.joints * random.standard_normal(q.shape[-1] - 7)
+        v += self.velocities * random.standard_normal(v.shape[-1])
         return state
 
 
@@ -60,7 +60,8 @@ class ResetNoise:
 class EnvironmentConfig:
     """Configuration of an environment, without its plans."""
 
-    # Robot: go2, a1, or a YAML file, see docs/own_robot.md.
+    # Robot: go2, a1, or a YAML file, see docs/own_robot.md; or g1, see
+    # docs/humanoid.md.
     robot: Annotated[str, tyro.conf.arg(metavar="ROBOT|FILE")] = "go2"
     # Contact solver, time step and friction.
     plant: PlantConfig = field(default_factory=PlantConfig)
@@ -87,7 +88,7 @@ class EnvironmentConfig:
 
     def check(self) -> None:
         """Raises InputError unless every part is sound."""
-        robot = get_robot(self.robot)
+        robot = get_simulated(self.robot)
         self.plant.check()
         plant_damping(robot, self.plant)
         self.termination.check()

@@ -8,20 +8,31 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from loco_drake.control.observation import OBSERVATION_SIZE
+from loco_drake.control.observation import LAYOUT, Layout, layout_of
 from loco_drake.control.plan import Plan
 from loco_drake.control.reward import REWARD_TERMS
-from loco_drake.models.robots import get_robot
+from loco_drake.models.robots import get_robot, get_simulated
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.references import generate_references, load_references
 
 Observation = NDArray[np.float32]
 
-OBSERVATION_SPACE = gymnasium.spaces.Box(
-    -np.inf, np.inf, (OBSERVATION_SIZE,), np.float32
-)
-ACTION_SPACE = gymnasium.spaces.Box(-10.0, 10.0, (12,), np.float32)
+
+_Space = gymnasium.spaces.Space[Observation]
+
+
+def spaces_of(layout: Layout) -> tuple[_Space, _Space]:
+    """Returns the spaces of observations and of actions."""
+    joints = len(layout.mirror_joints)
+    return (
+        gymnasium.spaces.Box(-np.inf, np.inf, (layout.size,), np.float32),
+        gymnasium.spaces.Box(-10.0, 10.0, (joints,), np.float32),
+    )
+
+
+# Of robots with three joints a leg.
+OBSERVATION_SPACE, ACTION_SPACE = spaces_of(LAYOUT)
 
 
 class TrackingEnv(gymnasium.Env[Observation, Observation]):
@@ -46,8 +57,8 @@ class TrackingEnv(gymnasium.Env[Observation, Observation]):
     ) -> None:
         self.config = config or EnvironmentConfig()
         self.plans = plans
-        self.observation_space = OBSERVATION_SPACE
-        self.action_space = ACTION_SPACE
+        layout = layout_of(get_simulated(self.config.robot))
+        self.observation_space, self.action_space = spaces_of(layout)
         self._batch = TrackingBatch(plans, self.config, 1)
 
     def reset(
@@ -96,11 +107,10 @@ def make_tracking(
         seed: seed of the generated motion.
     """
     config = config or EnvironmentConfig()
-    robot = get_robot(config.robot)
     if references is not None:
-        plans = load_references(robot, references)
+        plans = load_references(get_simulated(config.robot), references)
     else:
         plans = generate_references(
-            robot, labels, count=count, seconds=seconds, seed=seed
+            get_robot(config.robot), labels, count=count, seconds=seconds, seed=seed
         )
     return TrackingEnv(plans, config)

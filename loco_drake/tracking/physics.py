@@ -85,9 +85,9 @@ class SharedWorld(_Simulation):
         """Does nothing, since every episode's world is the model's."""
 
     def advance(self, state: Array, desired_state: Array) -> Array:
-        """Returns the state [q, v], (37,), one control period after ``state``.
+        """Returns the state [q, v], (13 + 2 J,), one control period after ``state``.
 
-        The PD's desired state is [q_d, v_d], shape (24,).
+        The PD's desired state is [q_d, v_d], shape (2 J,).
         """
         self._set(state, desired_state)
         if not self._runs_on:

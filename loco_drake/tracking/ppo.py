@@ -16,10 +16,10 @@ from loco_drake.control.actor import (
     OBSERVATION_CLIP,
     Actor,
     ActorConfig,
-    mirror_actions,
-    mirror_observations,
+    mirrors,
     unprivileged_mask,
 )
+from loco_drake.control.observation import LAYOUT, Layout
 from loco_drake.tracking.config import PpoConfig
 
 
@@ -34,15 +34,22 @@ class SymmetricPolicy(ActorCriticPolicy):
 
     _mask: Tensor
 
-    def __init__(self, *args: Any, privileged: bool = True, **kwargs: Any) -> None:
+    def __init__(
+        self,
+        *args: Any,
+        privileged: bool = True,
+        layout: Layout = LAYOUT,
+        **kwargs: Any,
+    ) -> None:
         super().__init__(*args, **kwargs)
         self._privileged = privileged
-        self.register_buffer("_mask", unprivileged_mask(), persistent=False)
+        self._mirrors = mirrors(layout)
+        self.register_buffer("_mask", unprivileged_mask(layout), persistent=False)
 
     def forward(
         self, obs: Any, deterministic: bool = False
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Returns actions (B, 12), values (B, 1) and log probabilities (B,)."""
+        """Returns actions (B, J), values (B, 1) and log probabilities (B,)."""
         distribution, values = self._evaluate(obs)
         actions = distribution.get_actions(deterministic=deterministic)
         return actions, values, distribution.log_prob(actions)
@@ -63,6 +70,7 @@ class SymmetricPolicy(ActorCriticPolicy):
         return self._evaluate(obs)[1]
 
     def _evaluate(self, obs: Any) -> tuple[Distribution, Tensor]:
+        mirror_observations, mirror_actions = self._mirrors
         seen = torch.cat((obs, mirror_observations(obs)))
         latent_vf = self.mlp_extractor.forward_critic(seen)
         if not self._privileged:
@@ -78,9 +86,13 @@ class SymmetricPolicy(ActorCriticPolicy):
 class SymmetricStatistics(RunningMeanStd):
     """Mean and variance of observations and their mirror images."""
 
+    def __init__(self, *args: Any, layout: Layout = LAYOUT, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._mirror, _ = mirrors(layout)
+
     def update(self, arr: NDArray[Any]) -> None:
         """Updates the statistics with observations (N, size)."""
-        super().update(np.concatenate((arr, mirror_observations(arr))))
+        super().update(np.concatenate((arr, self._mirror(arr))))
 
 
 class AdaptivePPO(PPO):
@@ -145,10 +157,12 @@ def make_ppo(
     config: PpoConfig,
     seed: int,
     device: torch.device | None = None,
+    layout: Layout = LAYOUT,
 ) -> AdaptivePPO:
     """Returns a learner on ``environment`` with normalized observations.
 
-    Its updates are computed on the device, by default the CPU.
+    Its updates are computed on the device, by default the CPU. The layout of the
+    observations is by default that of robots with three joints a leg.
     """
     normalized = VecNormalize(
         environment,
@@ -158,7 +172,8 @@ def make_ppo(
     )
     shape = environment.observation_space.shape
     assert shape is not None
-    normalized.obs_rms = cast(Any, SymmetricStatistics(shape=shape))
+    statistics = SymmetricStatistics(shape=shape, layout=layout)
+    normalized.obs_rms = cast(Any, statistics)
     learner = AdaptivePPO(
         SymmetricPolicy,
         normalized,
@@ -176,6 +191,7 @@ def make_ppo(
             "activation_fn": torch.nn.ELU,
             "log_std_init": config.log_std,
             "privileged": config.privileged,
+            "layout": layout,
         },
         seed=seed,
         device="cpu",

@@ -20,7 +20,7 @@ from loco_drake.control.terrain import (
 # Commands have these ranges as options; their --help does not wait for Drake.
 if TYPE_CHECKING:
     from loco_drake.models.plant import PlantConfig
-    from loco_drake.models.robots import Robot
+    from loco_drake.models.robots import SimulatedRobot
     from loco_drake.systems.scenario import Disturbances
 
 Array = NDArray[np.float64]
@@ -98,7 +98,7 @@ class RandomizationConfig:
     nominal_share: float = 0.0
 
     def check(
-        self, robot: "Robot | None" = None, plant: "PlantConfig | None" = None
+        self, robot: "SimulatedRobot | None" = None, plant: "PlantConfig | None" = None
     ) -> None:
         """Raises InputError unless every range can be drawn from.
 
@@ -106,6 +106,7 @@ class RandomizationConfig:
         """
         from loco_drake.models.parameters import check_strength
         from loco_drake.models.plant import PlantConfig
+        from loco_drake.models.robots import Robot
 
         limits = {**BOUNDS, "push": (0.0, inf), "push_interval": (PUSH_DURATION, inf)}
         limits["motor_strength"] = limits.pop("strength")
@@ -121,6 +122,13 @@ class RandomizationConfig:
                     f"The randomization's {name} must be two numbers, the smaller one "
                     f"first, of at least {least:g}{limit}, not {low:g} and {high:g}."
                 )
+        if robot is not None and not isinstance(robot, Robot):
+            if self.is_off:
+                return
+            raise InputError(
+                f"Worlds are randomized of robots with three joints a leg, not of "
+                f"{robot.name}: leave out --randomize, pushes and all ranges."
+            )
         lightest = (self.payload or (0.0,))[0]
         if robot is not None and lightest < robot.least_payload:
             raise InputError(
@@ -176,7 +184,11 @@ class RandomizationConfig:
         return not self.changes_physics and self.noise is None
 
     def draw(
-        self, robot: "Robot", random: np.random.Generator, start: float, end: float
+        self,
+        robot: "SimulatedRobot",
+        random: np.random.Generator,
+        start: float,
+        end: float,
     ) -> Domain:
         """Returns a world; parts that are off draw nothing.
 
@@ -250,7 +262,11 @@ class RandomizationConfig:
         )
 
     def _draw_pushes(
-        self, robot: "Robot", random: np.random.Generator, start: float, end: float
+        self,
+        robot: "SimulatedRobot",
+        random: np.random.Generator,
+        start: float,
+        end: float,
     ) -> tuple[Push, ...]:
         from loco_drake.control.plan import PLAN_DT
 

@@ -1,7 +1,7 @@
 """Plans for training a tracker, smoothed in advance."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from loco_drake.common.errors import InputError, quoted
@@ -9,14 +9,20 @@ from loco_drake.control.plan import Plan, plan_from_motion
 from loco_drake.control.retiming import fall_limit, path_limits, smooth_plan
 from loco_drake.generation.generate import generate_motions
 from loco_drake.generation.motion_model import pretrained_motion_model
-from loco_drake.models.robots import Robot
+from loco_drake.models.legged import LeggedRobot
+from loco_drake.models.robots import Robot, SimulatedRobot
 from loco_drake.motion.gaits import parse_label
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.motion_folder import open_motions
 
 
-def smooth_motions(robot: Robot, motions: Iterable[Motion]) -> list[Plan]:
-    """Returns motions as plans, re-timed by the smoother."""
+def smooth_motions(robot: SimulatedRobot, motions: Iterable[Motion]) -> list[Plan]:
+    """Returns motions as plans, re-timed by the smoother.
+
+    It is for robots with three joints a leg; others follow motion at its own time.
+    """
+    if not isinstance(robot, Robot):
+        return [plan_from_motion(robot, motion) for motion in motions]
     limits = {
         grounded: path_limits(robot, fall_limit(grounded)) for grounded in (False, True)
     }
@@ -26,7 +32,7 @@ def smooth_motions(robot: Robot, motions: Iterable[Motion]) -> list[Plan]:
     ]
 
 
-def read_motions(robot: Robot, folder: Path) -> dict[Path, Motion]:
+def read_motions(robot: LeggedRobot, folder: Path) -> dict[Path, Motion]:
     """Returns the motions in ``folder``, packed or not, by file.
 
     Raises:
@@ -42,14 +48,19 @@ def read_motions(robot: Robot, folder: Path) -> dict[Path, Motion]:
         raise InputError(
             f"There are {count} motions called {quoted(name)} in {str(folder)!r}."
         )
-    for path, motion in motions.items():
-        if motion.robot != robot.name:
-            raise InputError(f"{path} is of {motion.robot}, not of {robot.name}.")
+    check_robot(robot, motions)
     return motions
 
 
-def load_references(robot: Robot, folder: Path) -> list[Plan]:
-    """Returns the Motion files in ``folder`` as plans, re-timed by the smoother.
+def check_robot(robot: LeggedRobot, motions: Mapping[Path, Motion]) -> None:
+    """Raises InputError unless all motions, by file, are of a robot."""
+    for path, motion in motions.items():
+        if motion.robot != robot.name:
+            raise InputError(f"{path} is of {motion.robot}, not of {robot.name}.")
+
+
+def load_references(robot: SimulatedRobot, folder: Path) -> list[Plan]:
+    """Returns the Motion files in ``folder`` as plans, see :func:`smooth_motions`.
 
     Raises:
         InputError: as :func:`read_motions`.

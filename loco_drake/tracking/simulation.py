@@ -29,7 +29,7 @@ class Past(NamedTuple):
     """An episode so far."""
 
     beginning: Beginning
-    actions: NDArray[np.float32]  # (steps, 12)
+    actions: NDArray[np.float32]  # (steps, J)
 
 
 class Reply(NamedTuple):
@@ -53,7 +53,7 @@ class Reset(NamedTuple):
 class Step(NamedTuple):
     """Asks for a control period."""
 
-    actions: NDArray[np.float32]  # (B, 12)
+    actions: NDArray[np.float32]  # (B, J)
     starts: list[Start]  # of the next episodes
 
 
@@ -135,7 +135,8 @@ class Simulation:
     def _restore(self, pasts: list[Past]) -> None:
         """Repeats all episodes, which end at the same time."""
         for left in range(max(len(past.actions) for past in pasts), -1, -1):
-            actions = np.zeros((len(pasts), 12), dtype=np.float32)
+            joints = pasts[0].actions.shape[-1]
+            actions = np.zeros((len(pasts), joints), dtype=np.float32)
             for i, (beginning, own) in enumerate(pasts):
                 if len(own) <= left:  # its turn has not come before
                     self._random[i].bit_generator.state = beginning.random

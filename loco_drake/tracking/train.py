@@ -19,14 +19,14 @@ from loco_drake.common.determinism import single_thread
 from loco_drake.common.device import find_device
 from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import Checkpoint, RunFolder
-from loco_drake.control.actor import Actor, ActorConfig
+from loco_drake.control.actor import Actor, ActorConfig, config_for
+from loco_drake.control.observation import layout_of
 from loco_drake.control.plan import Plan
 from loco_drake.engine.executor import Executor
 from loco_drake.engine.local import LOCAL
-from loco_drake.models.robots import get_robot
+from loco_drake.models.robots import get_simulated
 from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.tracking.beginning import (
-    LAYOUT,
     NAME,
     keep_recovery,
     of_checkpoint,
@@ -89,6 +89,8 @@ def train_tracker(
     config.check()
     if resume and first is not None:
         raise InputError("Give either a checkpoint to start from or resume, not both.")
+    robot = get_simulated(config.environment.robot)
+    layout = layout_of(robot)
     own = run_folder.options_of(config)
     own = {field.name: own[field.name] for field in fields(TrainingConfig)}
     run = {
@@ -96,18 +98,20 @@ def train_tracker(
         **run_folder.settings(own, "steps", "workers", "per_worker"),
         "environments": config.workers * config.per_worker,
         "references": f"{len(plans)} motions of {sum(map(len, plans))} samples",
-        "observation_layout": LAYOUT,
+        "observation_layout": [list(part) for part in layout.parts],
     }
     learns_on = find_device(device)
-    beginning = None if first is None else read_beginning(first, config.ppo.hidden)
+    beginning = (
+        None if first is None else read_beginning(first, config.ppo.hidden, layout)
+    )
     sampler = PlanSampler(
         plans,
         config.seed,
         failure_weight=config.environment.failure_weight,
         half_episode=config.environment.episode_steps // 2,
     )
-    actor = ActorConfig(
-        robot=get_robot(config.environment.robot).name,
+    actor = config_for(
+        robot,
         labels=[str(ROW_LABELS[i]) for i in sampler.present],
         hidden=config.ppo.hidden,
         privileged=config.ppo.privileged,
@@ -141,7 +145,7 @@ def train_tracker(
             executor=executor,
         )
         try:
-            learner = make_ppo(environment, config.ppo, config.seed, learns_on)
+            learner = make_ppo(environment, config.ppo, config.seed, learns_on, layout)
             if beginning is not None:
                 beginning.load(learner)
                 if config.ppo.restart_log_std is not None:
@@ -173,7 +177,7 @@ def train_tracker(
         finally:
             environment.close()
     return {
-        "robot": get_robot(config.environment.robot).name,
+        "robot": robot.name,
         "steps": saver.saved_steps,
         "wall_clock_s": time.monotonic() - start,
         "interrupted": interrupted,

@@ -18,10 +18,10 @@ from loco_drake.common.determinism import single_thread
 from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import Checkpoint
 from loco_drake.control.actor_file import load_actor, save_actor
+from loco_drake.control.observation import LAYOUT
 from loco_drake.control.plan import Plan
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.gaits import ROW_LABELS
-from loco_drake.tracking.beginning import LAYOUT
 from loco_drake.tracking.config import StudentConfig
 from loco_drake.tracking.learning_curve import PROGRESS, learning_curve, trim_log
 from loco_drake.tracking.sampler import PlanSampler
@@ -76,7 +76,7 @@ def train_student(
     run = {
         **run_folder.settings(own, "steps"),
         "references": f"{len(plans)} motions of {sum(map(len, plans))} samples",
-        "observation_layout": LAYOUT,
+        "observation_layout": [list(part) for part in LAYOUT.parts],
         "teacher_sha256": hashlib.sha256(teacher.read_bytes()).hexdigest(),
     }
     sampler = PlanSampler(plans, config.seed)

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from loco_drake.control.observation import OBSERVATION_SIZE
+from loco_drake.control.observation import layout_of
 from loco_drake.control.plan import Plan
 from loco_drake.engine.executor import TRIES, Executor, WorkerDiedError
 from loco_drake.engine.local import LOCAL
+from loco_drake.models.robots import get_simulated
 from loco_drake.tracking.config import EnvironmentConfig
-from loco_drake.tracking.environment import ACTION_SPACE, OBSERVATION_SPACE
+from loco_drake.tracking.environment import spaces_of
 from loco_drake.tracking.sampler import PlanSampler
 from loco_drake.tracking.simulation import (
     Beginning,
@@ -27,17 +28,13 @@ from loco_drake.tracking.simulation import (
     Step,
 )
 
-TWO_OBSERVATIONS_SPACE = gymnasium.spaces.Box(
-    -np.inf, np.inf, (2 * OBSERVATION_SIZE,), np.float32
-)
-
 
 class WorkerVecEnv(VecEnv):
     """``workers * per_worker`` environments for stable-baselines3.
 
     Many environments per worker process amortise pipes and inference. The sampler draws
     the start of each episode and is told how it went; ``seed`` is of all else. If
-    ``exact``, observations (OBSERVATION_SIZE,) are followed by those of the true state,
+    ``exact``, observations (size,) are followed by those of the true state,
     without the sensors' errors.
 
     A worker that dies is replaced by one that repeats the episodes which were going on:
@@ -62,8 +59,13 @@ class WorkerVecEnv(VecEnv):
         exact: bool = False,
         executor: Executor = LOCAL,
     ) -> None:
-        space = TWO_OBSERVATIONS_SPACE if exact else OBSERVATION_SPACE
-        super().__init__(workers * per_worker, space, ACTION_SPACE)
+        layout = layout_of(get_simulated(config.robot))
+        space, action_space = spaces_of(layout)
+        if exact:
+            size = (2 * layout.size,)
+            space = gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32)
+        super().__init__(workers * per_worker, space, action_space)
+        self._joints = len(layout.mirror_joints)
         self._sampler = sampler
         self._episode_steps = config.episode_steps
         self._per_worker = per_worker
@@ -174,7 +176,8 @@ class WorkerVecEnv(VecEnv):
         pasts = []
         for i in range(own.start, own.stop):
             steps = before[len(before) - self._lengths[i] :]
-            actions = np.array([step[i] for step in steps], np.float32).reshape(-1, 12)
+            actions = np.array([step[i] for step in steps], np.float32)
+            actions = actions.reshape(-1, self._joints)
             pasts.append(Past(self._beginnings[i], actions))
         self._crew.send(w, Restore(pasts))
         self._crew.receive(w)
