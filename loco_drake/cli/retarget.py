@@ -96,8 +96,8 @@ class Retarget(WorkerOptions):
     # held out for validation have none.
     steer: Annotated[int, option(name="steered")] = 0
     data_dir: DataDir = None
-    # Continue a run that was stopped: motions that it wrote to --out with the same
-    # options are kept.
+    # Continue what is in --out: a run that was stopped, of which motions that it wrote
+    # with the same options are kept.
     resume: bool = False
     # Exit with status 1 if a figure of a clip is outside its bounds.
     strict: bool = False
