@@ -4,11 +4,14 @@ import json
 
 import numpy as np
 import pytest
+import torch
 
 from loco_drake.cli.main import main
+from loco_drake.common.errors import InputError
 from loco_drake.common.run_folder import read_checkpoint
 from loco_drake.control.actor_file import load_actor
 from loco_drake.models.robots import get_simulated
+from loco_drake.models.shipped import pretrained_path
 from loco_drake.motion.motion_file import save_motion
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.environment import make_tracking
@@ -45,6 +48,15 @@ def test_training_makes_a_policy_of_its_joints(policy):
     actor = load_actor(policy, get_simulated("g1"))
     assert actor.config.labels == ["other-other"]
     assert actor.layers[-1].out_features == 29
+
+
+def test_the_shipped_policy_is_the_humanoids():
+    """Of its 29 joints; the robots with twelve refuse it."""
+    actor = load_actor(pretrained_path("policy_g1"), get_simulated("g1"))
+    assert actor.config.labels == ["other-walk"]
+    assert actor(torch.zeros(actor.layout.size)).shape == (29,)
+    with pytest.raises(InputError, match="g1"):
+        load_actor(pretrained_path("policy_g1"), get_simulated("go2"))
 
 
 def test_its_plans_are_the_motion_at_its_own_time(folder):
