@@ -98,8 +98,8 @@ def test_it_is_simulated_and_evaluated_with_its_motion(folder, policy, capsys):
         ),
         ("simulate --robot g1 --no-meshcat", "g1 follows a Motion file"),
         (
-            "simulate --robot g1 --no-meshcat --reference {1}",
-            "There are no policy weights for g1 yet",
+            "simulate --robot g1 --no-meshcat --reference {1} --policy unprivileged",
+            "there is only the main one",
         ),
         (
             "simulate --robot g1 --no-meshcat --reference {1} --command 1 0 0",
