@@ -84,9 +84,7 @@ class EvaluateGeneration(Effort, Evaluation):
         ground = motions_grounded if model is None else model.grounded
         recorded = self.retarget(robot, ground)
         if model is not None:
-            config = model.tokenizer.config
-            first = config.robots[: len(config.robots) - len(config.added)]
-            others = [n for n in first[::-1] if n != name]
+            others = [n for n in model.tokenizer.config.first[::-1] if n != name]
             other = self.retarget(get_robot(others[0]), ground) if others else None
             say(f"Generating {', '.join(map(str, known))}")
             generated = model_figures.generate_for_scoring(

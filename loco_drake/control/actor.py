@@ -81,7 +81,7 @@ class ActorConfig:
     hidden: list[int] = field(default_factory=lambda: [256, 128])
     # Names and sizes of the parts of the observation.
     observation_layout: list[list[Any]] = field(
-        default_factory=lambda: [list(part) for part in LAYOUT.parts]
+        default_factory=lambda: list(LAYOUT.record)
     )
     # Number, from 1, of the joint whose mirror image each joint is, and the signs of
     # the angles there.
@@ -115,7 +115,7 @@ def config_for(robot: SimulatedRobot, **others: Any) -> ActorConfig:
     layout = layout_of(robot)
     return ActorConfig(
         robot=robot.name,
-        observation_layout=[list(part) for part in layout.parts],
+        observation_layout=list(layout.record),
         mirror_joints=(layout.mirror_joints + 1).tolist(),
         mirror_signs=layout.mirror_joint_signs.tolist(),
         **others,

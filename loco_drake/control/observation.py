@@ -58,8 +58,10 @@ class Layout:
         parts = _parts(len(mirror_joints), joints)
         self.mirror_joints = read_only(np.array(mirror_joints))  # of actions, too
         self.mirror_joint_signs = read_only(np.array(mirror_joint_signs))
-        # Names and sizes of the parts, in order: what a policy's weights record.
+        # Names and sizes of the parts, in order.
         self.parts = tuple((name, size) for name, size, _ in parts)
+        # The same as JSON has it: what weights and checkpoints record.
+        self.record = tuple([name, size] for name, size, _ in parts)
         self.size = sum(size for _, size in self.parts)
         ends = np.cumsum([size for _, size in self.parts]).tolist()
         # Where each part is in the observation.

@@ -40,6 +40,11 @@ class TokenizerConfig:
     # Those of ``added``, the last ones, that have layers of their own.
     bodies: tuple[str, ...] = field(default=(), repr=False)
 
+    @property
+    def first(self) -> tuple[str, ...]:
+        """Those of ``robots`` that were not added later."""
+        return self.robots[: len(self.robots) - len(self.added)]
+
 
 # Weights that have a row for each robot.
 BODY_ROWS = ("decoder_robot.weight", "encoder_robot.weight")
@@ -209,15 +214,14 @@ class Tokenizer(nn.Module):
         It says what codes mean, to which robots that were added later make no
         difference.
         """
-        first = len(self.config.robots) - len(self.config.added)
-        config = replace(self.config, robots=self.config.robots[:first])
+        config = replace(self.config, robots=self.config.first)
         # With the field names of the first weights.
         digest = sha256(repr(config).replace("codebook", "book").encode())
         for name, value in sorted(self.state_dict().items()):
             if name.startswith("bodies."):
                 continue
             if name in BODY_ROWS:
-                value = value[:first]
+                value = value[: len(config.robots)]
             data = value.half() if value.is_floating_point() else value
             digest.update(name.encode() + data.contiguous().numpy().tobytes())
         return digest.hexdigest()[:16]

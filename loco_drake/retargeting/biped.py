@@ -24,9 +24,7 @@ from loco_drake.retargeting.biped_scaling import (
     upper_marks,
 )
 from loco_drake.retargeting.bounds import judged
-from loco_drake.retargeting.contacts import (
-    UPRIGHT,
-)
+from loco_drake.retargeting.contacts import UPRIGHT
 from loco_drake.retargeting.inverse_kinematics import Linkage, PointSolver, Solution
 from loco_drake.retargeting.preparation import prepare
 from loco_drake.retargeting.scaling import (

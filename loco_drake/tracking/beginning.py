@@ -96,7 +96,7 @@ def read_beginning(path: Path, hidden: list[int], layout: Layout = LAYOUT) -> Be
             beginning = replace(beginning, recovery=read_actor(beside)[0])
     if own != hidden:
         raise InputError(f"{path} is of networks with --hidden {own}, not {hidden}.")
-    wanted = [list(part) for part in layout.parts]
+    wanted = list(layout.record)
     if (parts or wanted) != wanted:
         raise InputError(f"{path} is of another observation layout.")
     return beginning

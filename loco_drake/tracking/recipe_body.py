@@ -37,6 +37,12 @@ def knows(robot: Robot) -> bool:
     return robot.name in config.robots
 
 
+def tokenizer_in(out: Path) -> Path | None:
+    """Returns the tokenizer that a run folder has, or None."""
+    path = out / _WEIGHTS
+    return path if path.is_file() else None
+
+
 def make_body(
     robot: Robot,
     body: Body,
@@ -62,9 +68,8 @@ def make_body(
     Returns:
         The tokenizer's file; None if it was stopped before it was complete.
     """
-    weights = out / _WEIGHTS
-    if weights.is_file():
-        return weights
+    if (made := tokenizer_in(out)) is not None:
+        return made
     if not _make_motions(robot, body, motions, report, stopped):
         return None
     settings = LoopSettings(
@@ -76,7 +81,7 @@ def make_body(
     )
     library = load_library(motions, scratch=motions)
     _, result = train_bodies(library, network_path(robot, "tokenizer"), settings)
-    return None if result.stopped else weights
+    return None if result.stopped else tokenizer_in(out)
 
 
 def _make_motions(

@@ -26,7 +26,7 @@ from loco_drake.tracking.recipe import (
     read_recipe,
     write_recipe,
 )
-from loco_drake.tracking.recipe_body import knows, make_body
+from loco_drake.tracking.recipe_body import knows, make_body, tokenizer_in
 from loco_drake.tracking.recipe_evaluation import Evaluator
 from loco_drake.tracking.recipe_folder import (
     BEFORE,
@@ -200,8 +200,7 @@ class _Run:
         robot, sets = get_robot(self.recipe.robot), dict(self.recipe.references)
         if self.recipe.evaluation is not None:
             sets[EVALUATION] = self.recipe.evaluation.motions
-        taught = self.folder / TOKENIZER / "tokenizer.safetensors"
-        own = taught if taught.is_file() else None
+        own = tokenizer_in(self.folder / TOKENIZER)
         for name, references in sets.items():
 
             def report(done: int, total: int, name: str = name) -> None:

@@ -98,7 +98,7 @@ def train_tracker(
         **run_folder.settings(own, "steps", "workers", "per_worker"),
         "environments": config.workers * config.per_worker,
         "references": f"{len(plans)} motions of {sum(map(len, plans))} samples",
-        "observation_layout": [list(part) for part in layout.parts],
+        "observation_layout": list(layout.record),
     }
     learns_on = find_device(device)
     beginning = (

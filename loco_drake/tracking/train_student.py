@@ -76,7 +76,7 @@ def train_student(
     run = {
         **run_folder.settings(own, "steps"),
         "references": f"{len(plans)} motions of {sum(map(len, plans))} samples",
-        "observation_layout": [list(part) for part in LAYOUT.parts],
+        "observation_layout": list(LAYOUT.record),
         "teacher_sha256": hashlib.sha256(teacher.read_bytes()).hexdigest(),
     }
     sampler = PlanSampler(plans, config.seed)
