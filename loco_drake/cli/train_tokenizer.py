@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 from loco_drake.cli.options import MotionFolders, OutFolder, option
 from loco_drake.cli.training import SCORED, Learned, NetworkTraining, Scores
+from loco_drake.common.errors import InputError
 
 
 @dataclass(kw_only=True)
@@ -14,7 +15,8 @@ class TrainTokenizer(NetworkTraining):
     """Train the VQ-VAE that encodes motion as tokens and decodes it.
 
     With --add-to, teaches a tokenizer robots that it does not know yet: its codes, and
-    the robots that it knows, stay as they are, and so does its generator.
+    the robots that it knows, stay as they are, and so does its generator. With
+    --fine-tune, its decoder learns on; its codes and its generator stay.
 
     Ctrl-C saves a checkpoint and stops; --resume continues.
     """
@@ -26,6 +28,9 @@ class TrainTokenizer(NetworkTraining):
     # Tokenizer to add to: it learns the robots of the motions that it does not know,
     # and nothing else; shipped, or a file of weights.
     add_to: Annotated[Path | None, option(metavar="NAME|FILE")] = None
+    # Tokenizer whose decoder to fine-tune: its codes are held; shipped, or a file of
+    # weights.
+    fine_tune: Annotated[Path | None, option(metavar="NAME|FILE")] = None
     # Folder to write to: tokenizer.safetensors, the checkpoint and logs.
     out: OutFolder = Path("runs/tokenizer")
     # Number of training steps: the optimizer's, including those before --resume.
@@ -39,18 +44,20 @@ class TrainTokenizer(NetworkTraining):
         from loco_drake.generation.tokenizer import TokenizerConfig
         from loco_drake.generation.tokenizer_score import codebook_use, score_tokenizer
         from loco_drake.generation.train_bodies import train_bodies
+        from loco_drake.generation.train_decoder import train_decoder
         from loco_drake.generation.train_tokenizer import train_tokenizer
         from loco_drake.generation.training_motions import load_library
-        from loco_drake.models.shipped import pretrained_path
 
+        if self.add_to is not None and self.fine_tune is not None:
+            raise InputError("Give either --add-to or --fine-tune.")
         library = load_library(*self.motions, scratch=self.scratch)
-        if self.add_to is None:
+        if self.add_to is not None:
+            tokenizer, result = train_bodies(library, _named(self.add_to), self)
+        elif self.fine_tune is not None:
+            tokenizer, result = train_decoder(library, _named(self.fine_tune), self)
+        else:
             config = TokenizerConfig(robots=library.robots)
             tokenizer, result = train_tokenizer(library, config, self)
-        else:
-            shipped = str(self.add_to) == "shipped"
-            base = pretrained_path("tokenizer") if shipped else self.add_to
-            tokenizer, result = train_bodies(library, base, self)
 
         def score() -> Scores:
             sides = {
@@ -71,3 +78,10 @@ class TrainTokenizer(NetworkTraining):
             return Scores(figures, columns, rows, f": {used:.0%} of the codes are used")
 
         return result, score
+
+
+def _named(base: Path) -> Path:
+    """Returns the file of a tokenizer: ``shipped``, or a file of weights."""
+    from loco_drake.models.shipped import pretrained_path
+
+    return pretrained_path("tokenizer") if str(base) == "shipped" else base

@@ -39,6 +39,8 @@ class TokenizerConfig:
     added: tuple[str, ...] = field(default=(), repr=False)
     # Those of ``added``, the last ones, that have layers of their own.
     bodies: tuple[str, ...] = field(default=(), repr=False)
+    # Fingerprint of the tokenizer whose codes it has, if its decoder was fine-tuned.
+    codes_of: str = field(default="", repr=False)
 
     @property
     def first(self) -> tuple[str, ...]:
@@ -212,8 +214,10 @@ class Tokenizer(nn.Module):
         """Hash of these weights in 16 bits, as they are shipped.
 
         It says what codes mean, to which robots that were added later make no
-        difference.
+        difference. A tokenizer whose decoder was fine-tuned has that from before.
         """
+        if self.config.codes_of:
+            return self.config.codes_of
         config = replace(self.config, robots=self.config.first)
         # With the field names of the first weights.
         digest = sha256(repr(config).replace("codebook", "book").encode())

@@ -9,7 +9,6 @@ remains the same to the last bit.
 from collections.abc import Iterable
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -123,20 +122,12 @@ def train_bodies(
     tokenizer = _finished(grown, rows.values())
     if not result.stopped:
         labels = [str(label) for label in library.labels]
-        info = {"labels": labels, "training": _record(library, settings, path)}
+        before = read_training_record(path, "tokenizer")
+        record = training_record(library, settings, before)
+        info = {"labels": labels, "training": record}
         target = Path(settings.out) / "tokenizer.safetensors"
         save_network(target, "tokenizer", tokenizer, info, half=True)
     return tokenizer, result
-
-
-def _record(library: Library, settings: LoopSettings, path: Path) -> dict[str, Any]:
-    """Returns the record of this training, and the recordings of the one before."""
-    record = training_record(library, settings)
-    before = (read_training_record(path, "tokenizer") or {}).get("recordings", {})
-    own = record["recordings"]
-    names = sorted({*before, *own})
-    merged = {name: {**before.get(name, {}), **own.get(name, {})} for name in names}
-    return {**record, "recordings": merged}
 
 
 class _Held:

@@ -149,16 +149,25 @@ def clip_probabilities(clips: Sequence[Clip]) -> Array:
     return np.array(weights) / np.sum(weights)
 
 
-def training_record(library: Library, settings: LoopSettings) -> dict[str, Any]:
+def training_record(
+    library: Library, settings: LoopSettings, after: dict[str, Any] | None = None
+) -> dict[str, Any]:
     """Returns the record of a training, as JSON.
 
     ``recordings`` are the seconds that were learned from of each subject (a recording,
     or an animal with all of its own) and robot, mirror images not counted; ``held_out``
     are the subjects that were not; ``grounded`` is as in Library.
+
+    Args:
+        library: what was learned from.
+        settings: how.
+        after: the record of the training that went before, whose recordings count, too.
     """
     seconds: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
     for clip in library.train[: len(library.train) // 2]:  # then come mirror images
         seconds[clip.recording][clip.robot] += len(clip) / FPS
+    for name, of_robot in (after or {}).get("recordings", {}).items():
+        seconds[name] = defaultdict(float, {**of_robot, **seconds[name]})
     return {
         "robots": list(library.robots),
         "grounded": library.grounded,

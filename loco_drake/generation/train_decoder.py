@@ -1,0 +1,121 @@
+"""Fine-tuning of a tokenizer's decoder, the codes held.
+
+While the codes are learned, the losses also shape what codes can mean. Once they are
+held, the decoder alone learns to write each code as exactly as it can. A generator that
+was trained on the codes remains as good as it was.
+"""
+
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from loco_drake.common.device import find_device
+from loco_drake.common.errors import InputError
+from loco_drake.common.weights import save_network
+from loco_drake.generation.loop_settings import LoopSettings
+from loco_drake.generation.point_masses import PointMasses
+from loco_drake.generation.tokenizer import Tokenizer, load_tokenizer
+from loco_drake.generation.tokenizer_score import Toes
+from loco_drake.generation.train_tokenizer import (
+    BATCH,
+    FEWEST_CODEBOOKS,
+    WEIGHTS,
+    Scales,
+    tokenizer_losses,
+)
+from loco_drake.generation.training import LoopResult, train
+from loco_drake.generation.training_motions import (
+    Library,
+    read_training_record,
+    training_record,
+)
+from loco_drake.generation.windows import PairedWindows, long_enough
+
+# Share of the batches that are decoded from some of the codebooks, the coarse ones.
+COARSE = 0.25
+_DECODER = ("decoder", "expand", "smooth")  # how the names of its layers begin
+_WEIGHTS = {name: WEIGHTS[name] for name in WEIGHTS if name != "commitment"}
+_WEIGHTS |= {"features": 4.0, "momentum": 0.05}
+
+
+def train_decoder(
+    library: Library, path: Path, settings: LoopSettings
+) -> tuple[Tokenizer, LoopResult]:
+    """Fine-tunes the decoder of the tokenizer at ``path``.
+
+    Writes ``tokenizer.safetensors`` if it was not stopped.
+
+    Raises:
+        InputError: if no clip is as long as a window, the library has robots that the
+            tokenizer does not know, the tokenizer has robots that were added to it, or
+            it cannot be read.
+    """
+    base = load_tokenizer(path)
+    robots = base.config.robots
+    clips = long_enough(library.train)
+    if base.config.added:
+        raise InputError(
+            f"{', '.join(base.config.added)} was added to the tokenizer and would be "
+            "decoded otherwise: fine-tune the tokenizer that it was added to."
+        )
+    if missing := sorted(set(library.robots) - set(robots)):
+        raise InputError(
+            f"The tokenizer does not know {', '.join(missing)}, but {', '.join(robots)}"
+            "; --add-to teaches it others."
+        )
+    tokenizer = Tokenizer(replace(base.config, codes_of=base.fingerprint))
+    tokenizer.load_state_dict(base.state_dict())
+    tokenizer.requires_grad_(False)
+    learning = nn.ModuleDict(
+        {
+            name: layers.requires_grad_(True)
+            for name, layers in tokenizer.named_children()
+            if name.startswith(_DECODER)
+        }
+    )
+    device = find_device(settings.device)
+    tokenizer.to(device)
+    toes, masses = Toes(robots, device), PointMasses(robots, device)
+    windows, scales = PairedWindows(clips, robots), Scales(clips, device)
+
+    def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
+        target, robot, label = (x.to(device) for x in windows(random, BATCH))
+        count = base.config.codebooks
+        if random.random() < COARSE:
+            count = int(random.integers(min(FEWEST_CODEBOOKS, count), count + 1))
+
+        def decoded(
+            features: Tensor, own: Tensor, decoded_for: Tensor
+        ) -> tuple[Tensor, Tensor]:
+            with torch.no_grad():
+                codes = tokenizer.encode(features, own)[..., :count]
+                embedded = tokenizer.lookup(codes)
+            repeated = embedded.repeat(len(decoded_for) // len(own), 1, 1)
+            held = torch.zeros((), device=device)
+            return tokenizer.decode_embedded(repeated, decoded_for), held
+
+        losses = tokenizer_losses(decoded, toes, masses, scales(label), target, robot)
+        losses = {name: losses[name] for name in _WEIGHTS}
+        weighted = (_WEIGHTS[name] * loss for name, loss in losses.items())
+        total = sum(weighted, torch.zeros((), device=device))
+        return total, {name: loss.item() for name, loss in losses.items()}
+
+    run = {
+        "network": asdict(tokenizer.config),
+        "weights": _WEIGHTS,
+        "motions": library.summary,
+        "base": base.fingerprint,
+    }
+    result = train("tokenizer", learning, loss_of_batch, settings, run)
+    tokenizer.cpu().eval().requires_grad_(False)
+    if not result.stopped:
+        labels = [str(label) for label in library.labels]
+        before = read_training_record(path, "tokenizer")
+        record = training_record(library, settings, before)
+        info = {"labels": labels, "training": record}
+        target = Path(settings.out) / "tokenizer.safetensors"
+        save_network(target, "tokenizer", tokenizer, info, half=True)
+    return tokenizer, result
