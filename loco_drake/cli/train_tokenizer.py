@@ -31,6 +31,9 @@ class TrainTokenizer(NetworkTraining):
     # Tokenizer whose decoder to fine-tune: its codes are held; shipped, or a file of
     # weights.
     fine_tune: Annotated[Path | None, option(metavar="NAME|FILE")] = None
+    # Number of codebooks, the coarsest first, that the generator writes: with
+    # --fine-tune, half of the batches are decoded from those alone.
+    books: Annotated[int | None, option(default="all")] = None
     # Folder to write to: tokenizer.safetensors, the checkpoint and logs.
     out: OutFolder = Path("runs/tokenizer")
     # Number of training steps: the optimizer's, including those before --resume.
@@ -50,11 +53,15 @@ class TrainTokenizer(NetworkTraining):
 
         if self.add_to is not None and self.fine_tune is not None:
             raise InputError("Give either --add-to or --fine-tune.")
+        if self.books is not None and self.fine_tune is None:
+            raise InputError("--books is for --fine-tune alone.")
         library = load_library(*self.motions, scratch=self.scratch)
         if self.add_to is not None:
             tokenizer, result = train_bodies(library, _named(self.add_to), self)
         elif self.fine_tune is not None:
-            tokenizer, result = train_decoder(library, _named(self.fine_tune), self)
+            tokenizer, result = train_decoder(
+                library, _named(self.fine_tune), self, self.books
+            )
         else:
             config = TokenizerConfig(robots=library.robots)
             tokenizer, result = train_tokenizer(library, config, self)

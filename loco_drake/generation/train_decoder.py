@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 
 from loco_drake.common.device import find_device
-from loco_drake.common.errors import InputError
+from loco_drake.common.errors import InputError, check_bounds
 from loco_drake.common.weights import save_network
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.point_masses import PointMasses
@@ -21,7 +21,6 @@ from loco_drake.generation.tokenizer import Tokenizer, load_tokenizer
 from loco_drake.generation.tokenizer_score import Toes
 from loco_drake.generation.train_tokenizer import (
     BATCH,
-    FEWEST_CODEBOOKS,
     WEIGHTS,
     Scales,
     tokenizer_losses,
@@ -34,19 +33,21 @@ from loco_drake.generation.training_motions import (
 )
 from loco_drake.generation.windows import PairedWindows, long_enough
 
-# Share of the batches that are decoded from some of the codebooks, the coarse ones.
-COARSE = 0.25
 _DECODER = ("decoder", "expand", "smooth")  # how the names of its layers begin
 _WEIGHTS = {name: WEIGHTS[name] for name in WEIGHTS if name != "commitment"}
-_WEIGHTS |= {"features": 4.0, "momentum": 0.05}
+# Decoded codes move too smoothly, by a tenth of their acceleration, and it is
+# acceleration by which generated motion is told from recordings.
+_WEIGHTS |= {"features": 4.0, "energy": 6.0, "momentum": 0.1}
 
 
 def train_decoder(
-    library: Library, path: Path, settings: LoopSettings
+    library: Library, path: Path, settings: LoopSettings, books: int | None = None
 ) -> tuple[Tokenizer, LoopResult]:
     """Fine-tunes the decoder of the tokenizer at ``path``.
 
-    Writes ``tokenizer.safetensors`` if it was not stopped.
+    Half of the batches are decoded from all codebooks, the others from the ``books``
+    coarsest, as many as the generator writes; None: from all. Writes
+    ``tokenizer.safetensors`` if it was not stopped.
 
     Raises:
         InputError: if no clip is as long as a window, the library has robots that the
@@ -66,6 +67,9 @@ def train_decoder(
             f"The tokenizer does not know {', '.join(missing)}, but {', '.join(robots)}"
             "; --add-to teaches it others."
         )
+    codebooks = base.config.codebooks
+    if books is not None:
+        check_bounds("--books", books, 1, codebooks)
     tokenizer = Tokenizer(replace(base.config, codes_of=base.fingerprint))
     tokenizer.load_state_dict(base.state_dict())
     tokenizer.requires_grad_(False)
@@ -83,9 +87,7 @@ def train_decoder(
 
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         target, robot, label = (x.to(device) for x in windows(random, BATCH))
-        count = base.config.codebooks
-        if random.random() < COARSE:
-            count = int(random.integers(min(FEWEST_CODEBOOKS, count), count + 1))
+        count = books if books is not None and random.random() < 0.5 else codebooks
 
         def decoded(
             features: Tensor, own: Tensor, decoded_for: Tensor
@@ -108,6 +110,7 @@ def train_decoder(
         "weights": _WEIGHTS,
         "motions": library.summary,
         "base": base.fingerprint,
+        "books": books,
     }
     result = train("tokenizer", learning, loss_of_batch, settings, run)
     tokenizer.cpu().eval().requires_grad_(False)
