@@ -37,7 +37,7 @@ _DECODER = ("decoder", "expand", "smooth")  # how the names of its layers begin
 _WEIGHTS = {name: WEIGHTS[name] for name in WEIGHTS if name != "commitment"}
 # Decoded codes move too smoothly, by a tenth of their acceleration, and it is
 # acceleration by which generated motion is told from recordings.
-_WEIGHTS |= {"features": 4.0, "energy": 6.0, "momentum": 0.1}
+_WEIGHTS |= {"features": 4.0, "energy": 6.0, "momentum": 0.3}
 
 
 def train_decoder(
