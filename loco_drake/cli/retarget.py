@@ -27,23 +27,27 @@ from loco_drake.motion.gaits import LABELS
 if TYPE_CHECKING:
     from loco_drake.datasets.segments import Segment
     from loco_drake.datasets.split import Split
+    from loco_drake.models.quadruped import Quadruped
     from loco_drake.retargeting.report import RetargetReport
     from loco_drake.retargeting.retarget import Outcome
+    from loco_drake.retargeting.scaling import Variant
 
 
 @dataclass(kw_only=True)
 class Retarget(WorkerOptions):
     """Retarget recordings to a robot and write Motion files at 50 frames/s.
 
-    With FILE, retargets one stretch of that recording. Without, retargets every stretch
-    in segments.csv of the data folder that has one of the fifteen gait labels, or those
-    selected by --source and --gait. The provenance in each file assigns its recording
+    With FILE, retargets one stretch of that recording, or the motion of another robot
+    if it is a Motion file. Without, retargets every stretch in segments.csv of the data
+    folder that has one of the fifteen gait labels, or those selected by --source and
+    --gait. The provenance in each file assigns its recording
     to training or validation; --seed determines this split, by animal or file, for the
     whole data folder. Trajectories of 2 s that do not overlap are cut from the
     stretches and written to OUT-trajectories.
     """
 
-    # A recording; needs --source and --gait.
+    # A recording, which needs --source and --gait; or a Motion file (*.npz), which has
+    # its own.
     file: Annotated[Path | None, tyro.conf.Positional, option(metavar="[FILE]")] = None
     source: Annotated[
         str | None,
@@ -123,10 +127,13 @@ class Retarget(WorkerOptions):
         if self.steer or self.ground:
             get_robot(self.robot)  # the file may be of one that is only retargeted to
         source = None if self.source is None else load_source(self.source)
-        segments, split = self._segments(source)
         variant = Variant(mirror=self.mirror, froude=self.froude, ground=self.ground)
         out = self.out or Path("motions") / f"{robot.name}{variant.suffix}"
         output.check_output(out, folder=True)
+        if self.file is not None and self.file.suffix == ".npz":
+            outcome = self._of_motion(self.file, robot, variant, out)
+            return self._tell(robot.definition, out, [outcome], None)
+        segments, split = self._segments(source)
         settings = settings_of(robot, variant, loaded_files())
         journal = Journal(out, settings, split, resume=self.resume)
         done = retarget_segments(
@@ -141,6 +148,37 @@ class Retarget(WorkerOptions):
         )
         journal.end()
         return statuses[0]
+
+    def _of_motion(
+        self, file: Path, robot: "Quadruped", variant: "Variant", out: Path
+    ) -> "Outcome":
+        """Retargets the motion of another robot."""
+        from loco_drake.datasets.segments import Segment
+        from loco_drake.models.robots import ROBOTS, get_robot
+        from loco_drake.motion.motion_file import load_motion, save_motion
+        from loco_drake.retargeting.retarget import Outcome
+        from loco_drake.retargeting.robot_clip import retarget_motion
+
+        if (self.source, self.start, self.end, self.fps) != (None,) * 4 or self.gait:
+            raise InputError(
+                "--source, --gait, --start, --end and --fps are for recordings; a "
+                "Motion file has its own."
+            )
+        motion, path = load_motion(file), out / file.name
+        if motion.robot not in ROBOTS:
+            raise InputError(
+                f"{file} is of {motion.robot}; motion of {' and '.join(ROBOTS)} can be "
+                "retargeted to other robots."
+            )
+        if path.resolve() == file.resolve():
+            raise InputError(f"{path} would be replaced; give another --out.")
+        known = get_robot(motion.robot)
+        made, report = retarget_motion(motion, known, robot, variant=variant)
+        label = motion.label
+        end = len(motion)
+        segment = Segment(label.source, file, label.gait, 0, end, motion.fps)
+        save_motion(made, path)
+        return Outcome(segment, path, report, None)
 
     def _tell(
         self, robot: str, out: Path, outcomes: "list[Outcome]", split: "Split | None"

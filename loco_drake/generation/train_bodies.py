@@ -17,7 +17,6 @@ from torch.nn import functional
 
 from loco_drake.common.device import find_device
 from loco_drake.common.errors import InputError
-from loco_drake.common.weights import save_network
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.tokenizer import (
     BODY_ROWS,
@@ -30,14 +29,12 @@ from loco_drake.generation.train_tokenizer import (
     BATCH,
     WEIGHTS,
     Scales,
+    save_trained,
     tokenizer_losses,
+    weighed,
 )
 from loco_drake.generation.training import LoopResult, train
-from loco_drake.generation.training_motions import (
-    Library,
-    read_training_record,
-    training_record,
-)
+from loco_drake.generation.training_motions import Library
 from loco_drake.generation.windows import PairedWindows, long_enough
 
 # What a robot's own motion is like counts most. Momentum is not asked for: what the
@@ -107,9 +104,7 @@ def train_bodies(
         losses = tokenizer_losses(
             _Held(grown), toes, None, scales(label), target, robot
         )
-        weighted = (_WEIGHTS[name] * loss for name, loss in losses.items())
-        total = sum(weighted, torch.zeros((), device=device))
-        return total, {name: loss.item() for name, loss in losses.items()}
+        return weighed(losses, _WEIGHTS)
 
     run = {
         "network": asdict(grown.config),
@@ -121,12 +116,7 @@ def train_bodies(
     grown.cpu()
     tokenizer = _finished(grown, rows.values())
     if not result.stopped:
-        labels = [str(label) for label in library.labels]
-        before = read_training_record(path, "tokenizer")
-        record = training_record(library, settings, before)
-        info = {"labels": labels, "training": record}
-        target = Path(settings.out) / "tokenizer.safetensors"
-        save_network(target, "tokenizer", tokenizer, info, half=True)
+        save_trained(tokenizer, library, settings, path)
     return tokenizer, result
 
 

@@ -14,7 +14,6 @@ from torch import Tensor, nn
 
 from loco_drake.common.device import find_device
 from loco_drake.common.errors import InputError, check_bounds
-from loco_drake.common.weights import save_network
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.point_masses import PointMasses
 from loco_drake.generation.tokenizer import Tokenizer, load_tokenizer
@@ -23,14 +22,12 @@ from loco_drake.generation.train_tokenizer import (
     BATCH,
     WEIGHTS,
     Scales,
+    save_trained,
     tokenizer_losses,
+    weighed,
 )
 from loco_drake.generation.training import LoopResult, train
-from loco_drake.generation.training_motions import (
-    Library,
-    read_training_record,
-    training_record,
-)
+from loco_drake.generation.training_motions import Library
 from loco_drake.generation.windows import PairedWindows, long_enough
 
 _DECODER = ("decoder", "expand", "smooth")  # how the names of its layers begin
@@ -100,10 +97,7 @@ def train_decoder(
             return tokenizer.decode_embedded(repeated, decoded_for), held
 
         losses = tokenizer_losses(decoded, toes, masses, scales(label), target, robot)
-        losses = {name: losses[name] for name in _WEIGHTS}
-        weighted = (_WEIGHTS[name] * loss for name, loss in losses.items())
-        total = sum(weighted, torch.zeros((), device=device))
-        return total, {name: loss.item() for name, loss in losses.items()}
+        return weighed(losses, _WEIGHTS)
 
     run = {
         "network": asdict(tokenizer.config),
@@ -115,10 +109,5 @@ def train_decoder(
     result = train("tokenizer", learning, loss_of_batch, settings, run)
     tokenizer.cpu().eval().requires_grad_(False)
     if not result.stopped:
-        labels = [str(label) for label in library.labels]
-        before = read_training_record(path, "tokenizer")
-        record = training_record(library, settings, before)
-        info = {"labels": labels, "training": record}
-        target = Path(settings.out) / "tokenizer.safetensors"
-        save_network(target, "tokenizer", tokenizer, info, half=True)
+        save_trained(tokenizer, library, settings, path)
     return tokenizer, result

@@ -6,7 +6,7 @@ so that the decoder can use the coarse ones alone.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import reduce
 from pathlib import Path
@@ -28,7 +28,11 @@ from loco_drake.generation.point_masses import PointMasses
 from loco_drake.generation.tokenizer import Tokenizer, TokenizerConfig
 from loco_drake.generation.tokenizer_score import Toes
 from loco_drake.generation.training import LoopResult, train
-from loco_drake.generation.training_motions import Library, training_record
+from loco_drake.generation.training_motions import (
+    Library,
+    read_training_record,
+    training_record,
+)
 from loco_drake.generation.windows import PairedWindows, long_enough
 from loco_drake.motion.gaits import LABELS
 
@@ -206,20 +210,42 @@ def train_tokenizer(
     def loss_of_batch(random: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         target, robot, label = (x.to(device) for x in windows(random, BATCH))
         losses = tokenizer_losses(learning, toes, masses, scales(label), target, robot)
-        weighted = (WEIGHTS[name] * loss for name, loss in losses.items())
-        total = sum(weighted, torch.zeros((), device=device))
-        return total, {name: loss.item() for name, loss in losses.items()}
+        return weighed(losses, WEIGHTS)
 
     network, motions = asdict(config), library.summary
     run = {"network": network, "weights": WEIGHTS, "motions": motions}
     result = train("tokenizer", learning, loss_of_batch, settings, run)
     tokenizer = learning.finish()
     if not result.stopped:
-        labels = [str(label) for label in library.labels]
-        info = {"labels": labels, "training": training_record(library, settings)}
-        path = Path(settings.out) / "tokenizer.safetensors"
-        save_network(path, "tokenizer", tokenizer, info, half=True)
+        save_trained(tokenizer, library, settings)
     return tokenizer, result
+
+
+def save_trained(
+    tokenizer: Tokenizer,
+    library: Library,
+    settings: LoopSettings,
+    base: Path | None = None,
+) -> None:
+    """Writes ``tokenizer.safetensors``, with the record of its training.
+
+    The record includes that of the tokenizer at ``base``, with which it began.
+    """
+    before = None if base is None else read_training_record(base, "tokenizer")
+    record = training_record(library, settings, before)
+    info = {"labels": [str(label) for label in library.labels], "training": record}
+    path = Path(settings.out) / "tokenizer.safetensors"
+    save_network(path, "tokenizer", tokenizer, info, half=True)
+
+
+def weighed(
+    losses: Mapping[str, Tensor], weights: Mapping[str, float]
+) -> tuple[Tensor, dict[str, float]]:
+    """Returns the sum of those losses that have weights, and each without, to log."""
+    chosen = {name: loss for name, loss in losses.items() if name in weights}
+    parts = (weights[name] * loss for name, loss in chosen.items())
+    total = sum(parts, torch.zeros_like(next(iter(chosen.values()))))
+    return total, {name: loss.item() for name, loss in chosen.items()}
 
 
 def tokenizer_losses(

@@ -8,15 +8,21 @@ of animals is; grounding gives it back.
 
 import numpy as np
 
+from loco_drake.common.errors import InputError
 from loco_drake.common.rotations import quat_rotate
 from loco_drake.models.quadruped import Quadruped
 from loco_drake.motion.keypoints import KeypointClip
 from loco_drake.motion.motion import Motion
 from loco_drake.motion.quality import toe_trajectories
+from loco_drake.retargeting.inverse_kinematics import LegSolver
+from loco_drake.retargeting.report import RetargetReport
+from loco_drake.retargeting.retarget import retarget_clip
 from loco_drake.retargeting.scaling import (
+    AS_RECORDED,
     ContactConfig,
     RetargetConfig,
     SmoothingConfig,
+    Variant,
 )
 
 # A toe in stance is on the ground and still, one that swings soon neither.
@@ -31,6 +37,32 @@ _CONTACT = ContactConfig(
     shortest_swing=0.03,
 )
 _SMOOTHING = SmoothingConfig(base=8.0, toes=10.0)
+
+
+def retarget_motion(
+    motion: Motion,
+    known: Quadruped,
+    robot: Quadruped,
+    solver: LegSolver | None = None,
+    variant: Variant = AS_RECORDED,
+) -> tuple[Motion, RetargetReport]:
+    """Returns a motion of the robot ``known`` as one of ``robot``, and a report on it.
+
+    Contacts are the motion's. A ``solver`` of the robot can be used again.
+
+    Raises:
+        InputError: if the motion changes its gait, or cannot be retargeted.
+    """
+    if len(motion.gait_changes) > 1:
+        raise InputError("A motion that changes its gait cannot be retargeted.")
+    return retarget_clip(
+        keypoints_of(motion, known),
+        robot,
+        config=config_of(known),
+        solver=solver,
+        variant=variant,
+        contacts=motion.contacts,
+    )
 
 
 def keypoints_of(motion: Motion, robot: Quadruped) -> KeypointClip:

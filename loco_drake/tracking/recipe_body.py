@@ -18,11 +18,10 @@ from loco_drake.generation.train_bodies import train_bodies
 from loco_drake.generation.training_motions import load_library
 from loco_drake.models.robots import Robot
 from loco_drake.models.shipped import network_path
-from loco_drake.motion.motion import FPS, Motion
+from loco_drake.motion.motion import FPS
 from loco_drake.motion.motion_file import save_motion
 from loco_drake.retargeting.inverse_kinematics import LegSolver
-from loco_drake.retargeting.retarget import retarget_clip
-from loco_drake.retargeting.robot_clip import config_of, keypoints_of
+from loco_drake.retargeting.robot_clip import retarget_motion
 from loco_drake.retargeting.scaling import Variant
 from loco_drake.tracking.recipe import Body
 
@@ -92,6 +91,7 @@ def _make_motions(
     stopped: Callable[[], bool],
 ) -> bool:
     known, solver = pretrained_motion_model(KNOWN), LegSolver(robot, FPS)
+    grounded = Variant(ground=True)
     done, total = 0, len(body.motions.gaits) * body.motions.count
     for unfinished in folder.glob(".*.npz"):
         unfinished.unlink()  # left by a process that was killed
@@ -107,24 +107,9 @@ def _make_motions(
                 # By which the tokenizer's training finds what belongs together.
                 origin = {"file": f"{label}-{seed}", "frames": f"0-{len(given)}"}
                 given = replace(given, provenance={**given.provenance, **origin})
-                moved = moved_to(robot, given, known.robot, solver)
+                moved, _ = retarget_motion(given, known.robot, robot, solver, grounded)
                 for name, motion in zip(names, (given, moved), strict=True):
                     save_motion(motion, folder / name)
             done += 1
             report(done, total)
     return True
-
-
-def moved_to(
-    robot: Robot, motion: Motion, known: Robot, solver: LegSolver | None = None
-) -> Motion:
-    """Returns a motion of ``known`` as the robot's, which obeys physics."""
-    moved, _ = retarget_clip(
-        keypoints_of(motion, known),
-        robot,
-        config=config_of(known),
-        solver=solver,
-        variant=Variant(ground=True),
-        contacts=motion.contacts,
-    )
-    return moved

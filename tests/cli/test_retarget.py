@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import pytest
 import tyro
@@ -7,12 +8,14 @@ from loco_drake.cli.main import main
 from loco_drake.cli.retarget import Retarget
 from loco_drake.common.errors import InputError
 from loco_drake.models.robots import get_robot, load_robot
+from loco_drake.motion.gaits import GaitLabel
 from loco_drake.motion.momentum import momentum_error
-from loco_drake.motion.motion_file import load_motion
+from loco_drake.motion.motion_file import load_motion, save_motion
 from loco_drake.retargeting.journal import JOURNAL
 from tests.robot_files import SOLO8
 from tests.synthetic import write_dog_recording, write_lying_dog
 from tests.synthetic_horse import make_horse, write_world_recording
+from tests.synthetic_motion import synthetic_motion
 from tests.synthetic_robots import write_mpc_recording, write_solo8_recording
 
 KEYS = {
@@ -398,3 +401,42 @@ def test_grounded_motion_goes_to_a_folder_of_its_own(
         assert momentum_error(load_motion(steered), robot) < 0.1
     with pytest.raises(InputError, match="three joints in each leg"):
         command(*options, "--robot", SOLO8, "--ground").run()
+
+
+def test_motion_of_another_robot(tmp_path, capsys):
+    """A Go2's becomes the A1's: its gait, its contacts, its own lengths."""
+    given = synthetic_motion(seconds=3.0, name="go2")
+    file, out = tmp_path / "mine.npz", tmp_path / "out"
+    save_motion(given, file)
+    line = (file, "--robot", "a1", "--ground", "--out", out)
+    assert command(*line, "--json", tmp_path / "a.json").run() == 0
+    made = load_motion(out / "mine.npz")
+    assert (made.robot, made.label) == ("a1", given.label)
+    assert (made.contacts == given.contacts).all()
+    assert made.provenance["moved_from"] == "go2"
+    (figures,) = json.loads((tmp_path / "a.json").read_text()).values()
+    assert figures["path"] == str(out / "mine.npz")
+    assert figures["stance_slip_median_mps"] < 1e-3
+    assert momentum_error(made, get_robot("a1")) < 0.06
+    assert "mine" in capsys.readouterr().out
+
+
+def refused(line, sentence, out):
+    with pytest.raises(InputError, match=sentence):
+        command(*line, "--out", out).run()
+    assert not list(out.glob("*.npz")) or out.samefile(line[0].parent)
+
+
+def test_motion_that_cannot_be_retargeted(tmp_path):
+    given = synthetic_motion(seconds=2.0, name="go2")
+    file, out = tmp_path / "mine.npz", tmp_path / "out"
+    save_motion(given, file)
+    refused((file, "--gait", "trot"), "a Motion file has its own", out)
+    refused((file, "--robot", "a1"), "would be replaced", tmp_path)
+    assert load_motion(file).robot == "go2"
+    changes = ((0, given.label), (50, GaitLabel("mpc", "trot")))
+    save_motion(replace(given, gait_changes=changes), tmp_path / "two.npz")
+    refused((tmp_path / "two.npz", "--robot", "a1"), "changes its gait", out)
+    save_motion(replace(given, robot="b1"), tmp_path / "b1.npz")
+    refused((tmp_path / "b1.npz",), "motion of go2 and a1 can be", out)
+    refused((tmp_path / "none.npz",), "There is no Motion file", out)
