@@ -45,12 +45,8 @@ class EvaluateTokenizer(Evaluation):
         robot = get_robot(name)
         path = self.tokenizer or network_path(robot, "tokenizer")
         tokenizer = load_tokenizer(path)
-        books, robots = tokenizer.config.codebooks, tokenizer.config.robots
-        if self.books is not None and not 1 <= self.books <= books:
-            raise InputError(
-                f"--books must be from 1 to {books}, as many as the tokenizer has, "
-                f"not {self.books}."
-            )
+        robots = tokenizer.config.robots
+        tokenizer.check_books(self.books)
         if name not in robots:
             raise InputError(
                 f"The tokenizer's weights are not for the robot {name!r}; they are "

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from loco_drake.cli.options import MotionFolders, OutFolder, option
 from loco_drake.cli.training import SCORED, Learned, NetworkTraining, Scores
-from loco_drake.common.errors import InputError, check_at_least
+from loco_drake.common.errors import check_at_least
 
 if TYPE_CHECKING:
     from loco_drake.generation.generator import GeneratorConfig
@@ -93,12 +93,7 @@ class TrainGenerator(NetworkTraining):
         """Returns the sizes of a generator to train."""
         from loco_drake.generation.generator import GeneratorConfig
 
-        most = tokenizer.config.codebooks
-        if not 1 <= self.books <= most:
-            raise InputError(
-                f"--books must be from 1 to {most}, as many as the tokenizer has, not "
-                f"{self.books}."
-            )
+        tokenizer.check_books(self.books)
         return GeneratorConfig(
             tokenizer=tokenizer.fingerprint,
             codebooks=self.books,

@@ -23,7 +23,10 @@ SCORED = 2000  # clips of a library that a network is scored on, at most
 # Options that are not the run's: where it is, and what a call does.
 _OF_THE_CALL = ("out", "resume", "json", "start_from")
 # Where it learned from may be elsewhere now: what is there is compared.
-_FOLDERS = ("motions", "references", "tokenizer", "tell", "add_to", "robot")
+_FOLDERS = (
+    *("motions", "references", "robot"),
+    *("tokenizer", "tell", "add_to", "fine_tune"),
+)
 
 
 class Scores(NamedTuple):

@@ -15,6 +15,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from loco_drake.common.errors import InputError
 from loco_drake.common.weights import load_network
 from loco_drake.generation.features import CONTACTS, SIZE
 
@@ -140,6 +141,15 @@ class Tokenizer(nn.Module):
         self.memory = sum(block.reach for block in decoder) + math.ceil(
             sum(block.reach for block in smooth) / frames
         )
+
+    def check_books(self, books: int | None) -> None:
+        """Raises InputError unless it has so many codebooks; None is all."""
+        most = self.config.codebooks
+        if books is not None and not 1 <= books <= most:
+            raise InputError(
+                f"--books must be from 1 to {most}, as many as the tokenizer has, not "
+                f"{books}."
+            )
 
     def set_statistics(self, mean: Tensor, std: Tensor) -> None:
         """Sets mean and deviation for normalization, those of features (SIZE,)."""

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 
 from loco_drake.common.device import find_device
-from loco_drake.common.errors import InputError, check_bounds
+from loco_drake.common.errors import InputError
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.point_masses import PointMasses
 from loco_drake.generation.tokenizer import Tokenizer, load_tokenizer
@@ -65,8 +65,7 @@ def train_decoder(
             "; --add-to teaches it others."
         )
     codebooks = base.config.codebooks
-    if books is not None:
-        check_bounds("--books", books, 1, codebooks)
+    base.check_books(books)
     tokenizer = Tokenizer(replace(base.config, codes_of=base.fingerprint))
     tokenizer.load_state_dict(base.state_dict())
     tokenizer.requires_grad_(False)

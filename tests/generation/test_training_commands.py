@@ -1,4 +1,5 @@
 import json
+from pathlib import Path
 
 import pytest
 
@@ -53,6 +54,13 @@ def test_from_motions_to_new_motions_by_three_commands(motions, tmp_path):
     generate.tokenizer = tmp_path / "other" / "tokenizer.safetensors"
     with pytest.raises(InputError, match="train the generator again"):
         generate.run()
+    # One whose decoder was fine-tuned does.
+    tuned = tmp_path / "tuned"
+    TrainTokenizer(
+        motions=(motions,), fine_tune=tokenizer, books=2, out=tuned, steps=1
+    ).run()
+    generate.tokenizer, generate.out = tuned / "tokenizer.safetensors", tmp_path / "fit"
+    assert generate.run() == 0
 
 
 @pytest.mark.parametrize(
@@ -61,6 +69,13 @@ def test_from_motions_to_new_motions_by_three_commands(motions, tmp_path):
         ({"steps": 0}, "--steps"),
         ({"learning_rate": float("nan")}, "--learning-rate"),
         ({"resume": True}, "There is no run to resume"),
+        ({"books": 8}, "--books is for --fine-tune"),
+        ({"fine_tune": Path("shipped"), "books": 13}, "--books must be from 1 to 12"),
+        (
+            {"fine_tune": Path("shipped"), "add_to": Path("shipped")},
+            "either --add-to or --fine-tune",
+        ),
+        ({"fine_tune": Path("none.safetensors")}, "none.safetensors"),
     ],
 )
 def test_bad_options_are_refused(options, message, motions, tmp_path):
