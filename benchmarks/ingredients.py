@@ -60,6 +60,7 @@ def main(
     steps: int = 250_000,
     seeds: tuple[int, ...] = (0, 1, 2),
     episodes: int = 3,
+    only: tuple[str, ...] = tuple(INGREDIENTS),
     json: Path = Path("ingredients.json"),
     table: tuple[Path, ...] = (),
 ) -> None:
@@ -70,6 +71,7 @@ def main(
         steps: of each training.
         seeds: of the trainings.
         episodes: of each gait in each world.
+        only: names of ingredients.
         json: file of the figures.
         table: files to print instead of training.
     """
@@ -82,8 +84,8 @@ def main(
         model, LABELS, count=MOTIONS, seconds=SECONDS, seed=FIRST_SEED
     )
     for seed in seeds:
-        for name, parts in INGREDIENTS.items():
-            key = f"{name}, seed {seed}"
+        for name in only:
+            key, parts = f"{name}, seed {seed}", INGREDIENTS[name]
             if key in figures:
                 continue
             config = TrainingConfig(
