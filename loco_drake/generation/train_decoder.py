@@ -33,8 +33,9 @@ from loco_drake.generation.windows import PairedWindows, long_enough
 _DECODER = ("decoder", "expand", "smooth")  # how the names of its layers begin
 _WEIGHTS = {name: WEIGHTS[name] for name in WEIGHTS if name != "commitment"}
 # Decoded codes move too smoothly, by a tenth of their acceleration, and it is
-# acceleration by which generated motion is told from recordings.
-_WEIGHTS |= {"features": 4.0, "energy": 6.0, "momentum": 0.3}
+# acceleration by which generated motion is told from recordings. Heavier features
+# would be more exact, and harder to follow: docs/generation_results.md.
+_WEIGHTS["energy"] = 6.0
 
 
 def train_decoder(
