@@ -57,7 +57,7 @@ WORLDS = {
 
 def main(
     robot: str = "go2",
-    steps: int = 250_000,
+    steps: int = 200_000,
     seeds: tuple[int, ...] = (0, 1, 2),
     episodes: int = 3,
     only: tuple[str, ...] = tuple(INGREDIENTS),
