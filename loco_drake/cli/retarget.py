@@ -40,10 +40,10 @@ class Retarget(WorkerOptions):
     With FILE, retargets one stretch of that recording, or the motion of another robot
     if it is a Motion file. Without, retargets every stretch in segments.csv of the data
     folder that has one of the fifteen gait labels, or those selected by --source and
-    --gait. The provenance in each file assigns its recording
-    to training or validation; --seed determines this split, by animal or file, for the
-    whole data folder. Trajectories of 2 s that do not overlap are cut from the
-    stretches and written to OUT-trajectories.
+    --gait. The provenance in each file assigns its recording to training or validation;
+    --seed determines this split, by animal or file, for the whole data folder.
+    Trajectories of 2 s that do not overlap are cut from the stretches and written to
+    OUT-trajectories.
     """
 
     # A recording, which needs --source and --gait; or a Motion file (*.npz), which has
