@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from loco_drake.common.weights import save_network
 from loco_drake.motion.motion_file import save_motion
 from tests.synthetic_motion import synthetic_motion
+from tests.tiny_model import make_tiny_model
 
 
 @pytest.fixture
@@ -33,3 +35,17 @@ def motions(tmp_path_factory) -> Path:
             )
             save_motion(motion, folder / f"{label}-{i}.npz")
     return folder
+
+
+@pytest.fixture(scope="module")
+def model():
+    return make_tiny_model()
+
+
+@pytest.fixture(scope="module")
+def base(model, tmp_path_factory):
+    """The file of a tokenizer that knows the Go2, and was trained on one recording."""
+    path = tmp_path_factory.mktemp("base") / "tokenizer.safetensors"
+    info = {"training": {"recordings": {"dog-other": {"go2": 3.0}}}}
+    save_network(path, "tokenizer", model.tokenizer, info)
+    return path

@@ -1,13 +1,10 @@
 """A tokenizer that learns another robot, and forgets nothing."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import torch
 
 from loco_drake.common.errors import InputError
-from loco_drake.common.weights import save_network
 from loco_drake.generation.features import JOINTS
 from loco_drake.generation.loop_settings import LoopSettings
 from loco_drake.generation.motion_model import MotionModel
@@ -15,22 +12,13 @@ from loco_drake.generation.tokenizer import load_tokenizer
 from loco_drake.generation.train_bodies import train_bodies
 from loco_drake.generation.training_motions import (
     Library,
-    motion_clip,
     read_training_record,
 )
 from loco_drake.models.robots import get_robot
+from tests.generation.one_clip import clip
 from tests.robot_files import OWN
-from tests.synthetic_motion import synthetic_motion
-from tests.tiny_model import make_tiny_model
 
 NAMES = ("go2", "anymal")
-
-
-def clip(robot, mirrored):
-    motion = synthetic_motion(name=robot, seconds=2.0)
-    origin = {"file": "one.txt", "frames": "0-100"}
-    motion = replace(motion, provenance={**motion.provenance, **origin})
-    return motion_clip(motion.mirrored() if mirrored else motion)
 
 
 @pytest.fixture(scope="module")
@@ -38,20 +26,6 @@ def library():
     get_robot(str(OWN["anymal"]))
     clips = [clip(robot, mirrored) for mirrored in (False, True) for robot in NAMES]
     return Library(tuple(clips), ())
-
-
-@pytest.fixture(scope="module")
-def model():
-    return make_tiny_model()
-
-
-@pytest.fixture(scope="module")
-def base(model, tmp_path_factory):
-    """The file of a tokenizer that knows the Go2, and was trained on one recording."""
-    path = tmp_path_factory.mktemp("base") / "tokenizer.safetensors"
-    info = {"training": {"recordings": {"dog-other": {"go2": 3.0}}}}
-    save_network(path, "tokenizer", model.tokenizer, info)
-    return path
 
 
 @pytest.fixture(scope="module")
