@@ -31,8 +31,8 @@ class TrainTokenizer(NetworkTraining):
     # Tokenizer whose decoder to fine-tune: its codes are held; shipped, or a file of
     # weights.
     fine_tune: Annotated[Path | None, option(metavar="NAME|FILE")] = None
-    # Number of codebooks, the coarsest first: as many as the generator writes; with
-    # --fine-tune, half of the batches are decoded from those alone.
+    # Number of codebooks, the coarsest first: as many as the generator writes. Half
+    # of the batches of --fine-tune are decoded from those alone.
     books: Annotated[int | None, option(default="all")] = None
     # Folder to write to: tokenizer.safetensors, the checkpoint and logs.
     out: OutFolder = Path("runs/tokenizer")

@@ -437,6 +437,6 @@ def test_motion_that_cannot_be_retargeted(tmp_path):
     changes = ((0, given.label), (50, GaitLabel("mpc", "trot")))
     save_motion(replace(given, gait_changes=changes), tmp_path / "two.npz")
     refused((tmp_path / "two.npz", "--robot", "a1"), "changes its gait", out)
-    save_motion(replace(given, robot="b1"), tmp_path / "b1.npz")
-    refused((tmp_path / "b1.npz",), "motion of go2 and a1 can be", out)
+    save_motion(replace(given, robot="stranger"), tmp_path / "stranger.npz")
+    refused((tmp_path / "stranger.npz",), "motion of go2 and a1 can be", out)
     refused((tmp_path / "none.npz",), "There is no Motion file", out)
