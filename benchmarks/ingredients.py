@@ -29,20 +29,20 @@ from loco_drake.evaluation.tracking_table import (
 from loco_drake.models.robots import get_robot
 from loco_drake.systems.scenario import GeneratedReference, Scenario, TrainedPolicy
 from loco_drake.tracking.config import EnvironmentConfig, PpoConfig, TrainingConfig
-from loco_drake.tracking.randomization import STANDARD, RandomizationConfig
+from loco_drake.tracking.randomization import PUSHES, STANDARD, RandomizationConfig
 from loco_drake.tracking.references import generate_references
 from loco_drake.tracking.train import POLICY, train_tracker
 
 LABELS = ["dog-pace", "dog-trot", "horse-walk", "horse-trot", "mpc-trot", "solo8-walk"]
 MOTIONS, FIRST_SEED = 12, 1000  # of each label, to train on
 SECONDS = 10.0
-PUSHES = RandomizationConfig(push=(0.3, 1.1), push_interval=(2.0, 4.0))
+PUSHED = RandomizationConfig(push=(0.3, 1.1), push_interval=(2.0, 4.0))
 OTHERS = replace(STANDARD, push=None)
-ALL = replace(OTHERS, push=PUSHES.push, push_interval=PUSHES.push_interval)
+ALL = replace(OTHERS, push=PUSHED.push, push_interval=PUSHED.push_interval)
 # What an environment has, by the name of the ingredient.
 INGREDIENTS: dict[str, dict[str, Any]] = {
     "none": {},
-    "pushes": {"randomization": PUSHES},
+    "pushes": {"randomization": PUSHED},
     "random worlds": {"randomization": OTHERS},
     "both": {"randomization": ALL},
     "both in half of the worlds": {"randomization": replace(ALL, nominal_share=0.5)},
@@ -50,7 +50,7 @@ INGREDIENTS: dict[str, dict[str, Any]] = {
 }
 WORLDS = {
     "undisturbed": RandomizationConfig(),
-    "pushed": RandomizationConfig(push=(1.0, 1.0), push_interval=(2.0, 2.0)),
+    "pushed": PUSHES,
     "randomized": STANDARD,
 }
 

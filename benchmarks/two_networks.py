@@ -25,12 +25,12 @@ from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import policy_path
 from loco_drake.systems.scenario import GeneratedReference, Scenario, TrainedPolicy
 from loco_drake.tracking.joining import near_of, recovery_of
-from loco_drake.tracking.randomization import RandomizationConfig
+from loco_drake.tracking.randomization import PUSHES, RandomizationConfig
 
 SECONDS = 10.0
 WORLDS = {
     "undisturbed": RandomizationConfig(),
-    "pushed": RandomizationConfig(push=(1.0, 1.0), push_interval=(2.0, 2.0)),
+    "pushed": PUSHES,
 }
 
 

@@ -164,6 +164,8 @@ class Retarget(WorkerOptions):
                 "--source, --gait, --start, --end and --fps are for recordings; a "
                 "Motion file has its own."
             )
+        if self.resume:
+            raise InputError("--resume is for recordings; a Motion file takes seconds.")
         motion, path = load_motion(file), out / file.name
         if motion.robot not in ROBOTS:
             raise InputError(

@@ -294,3 +294,6 @@ STANDARD = RandomizationConfig(
     push=(0.1, 0.8),
     noise=1.0,
 )
+
+# The pushes of `evaluate tracking --pushes`.
+PUSHES = RandomizationConfig(push=(1.0, 1.0), push_interval=(2.0, 2.0))

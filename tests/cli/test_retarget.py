@@ -432,6 +432,7 @@ def test_motion_that_cannot_be_retargeted(tmp_path):
     file, out = tmp_path / "mine.npz", tmp_path / "out"
     save_motion(given, file)
     refused((file, "--gait", "trot"), "a Motion file has its own", out)
+    refused((file, "--resume"), "--resume is for recordings", out)
     refused((file, "--robot", "a1"), "would be replaced", tmp_path)
     assert load_motion(file).robot == "go2"
     changes = ((0, given.label), (50, GaitLabel("mpc", "trot")))
