@@ -40,24 +40,40 @@ def reward_terms(
     States (..., 13 + 2 J) are [q, v] with unit quaternions, ``plan_p_BoF_H`` (..., 4,
     3) is as :attr:`Plan.p_BoF_H`.
     """
+    residuals = reward_residuals(robot, plan_state, plan_p_BoF_H, state)
+    exponents = np.stack([_squares(part) for part in residuals], axis=-1)
+    return REWARD_WEIGHTS * np.exp(-exponents)
+
+
+def reward_residuals(
+    robot: SimulatedRobot, plan_state: Array, plan_p_BoF_H: Array, state: Array
+) -> tuple[Array, ...]:
+    """Returns what the terms square: their exponents are minus the sums of squares.
+
+    Arguments are those of :func:`reward_terms`; the shapes are (..., J), (..., J),
+    (..., 12), (..., 6) and (..., 6).
+    """
     (q, v), (plan_q, plan_v) = split(state), split(plan_state)
     R_WB = quat_to_matrix(q[ORIENTATION])
     p_BoF_H = robot.contact_points(q[JOINTS]) @ (
         np.swapaxes(R_WB, -1, -2) @ heading_matrix(R_WB)
     )
-    gap = q - plan_q
-    turn = quat_error(q[ORIENTATION], plan_q[ORIENTATION])
-    velocity = v - plan_v
-    toes = p_BoF_H - plan_p_BoF_H
+    gap, velocity, toes = q - plan_q, v - plan_v, p_BoF_H - plan_p_BoF_H
+    turn = quat_error(plan_q[ORIENTATION], q[ORIENTATION])
     share = _JOINTS / len(robot.joint_names)
-    exponents = (
-        5 * share * _squares(gap[JOINTS]),
-        0.1 * share * _squares(velocity[JOINT_VELOCITIES]),
-        40 * _squares(toes.reshape(*toes.shape[:-2], 12)),
-        20 * _squares(gap[POSITION]) + 10 * _squares(turn),
-        2 * _squares(velocity[VELOCITY]) + 0.2 * _squares(velocity[ANGULAR_VELOCITY]),
+    return (
+        np.sqrt(5 * share) * gap[JOINTS],
+        np.sqrt(0.1 * share) * velocity[JOINT_VELOCITIES],
+        np.sqrt(40.0) * toes.reshape(*toes.shape[:-2], 12),
+        np.concatenate((np.sqrt(20.0) * gap[POSITION], np.sqrt(10.0) * turn), axis=-1),
+        np.concatenate(
+            (
+                np.sqrt(2.0) * velocity[VELOCITY],
+                np.sqrt(0.2) * velocity[ANGULAR_VELOCITY],
+            ),
+            axis=-1,
+        ),
     )
-    return REWARD_WEIGHTS * np.exp(-np.stack(exponents, axis=-1))
 
 
 def _squares(error: Array) -> Array:
