@@ -24,7 +24,8 @@ from loco_drake.models.shipped import policy_path
 from loco_drake.motion.gaits import LABELS
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.config import EnvironmentConfig, ResetNoise
-from loco_drake.tracking.ilqr import Ilqr, IlqrConfig
+from loco_drake.tracking.guided_config import IlqrConfig
+from loco_drake.tracking.ilqr import Ilqr
 from loco_drake.tracking.problem import TrackingProblem
 from loco_drake.tracking.references import generate_references
 

@@ -33,6 +33,7 @@ _COMMANDS = {
     "train generator": "train the GPT that generates tokens",
     "train tracker": "train the tracking policy with PPO",
     "train recipe": "train a tracking policy from nothing, in stages",
+    "train guided": "improve a tracking policy by guided policy search",
     "train student": "train a policy without privileged observations, by a teacher",
     "train classifier": "train the transformer that classifies gaits",
     "runs list": "list trainings, how far they are and what they score",

@@ -11,7 +11,7 @@ from loco_drake.cli.options import Json, UnusedSeed, option
 from loco_drake.cli.output import do_all, print_table, say, write_json
 from loco_drake.common.errors import InputError
 
-_TRAININGS = ("tokenizer", "generator", "tracker", "student", "classifier")
+_TRAININGS = ("tokenizer", "generator", "tracker", "guided", "student", "classifier")
 
 
 @dataclass(kw_only=True)

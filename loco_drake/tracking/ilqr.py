@@ -7,36 +7,26 @@ trajectory, solves the linear-quadratic problem backwards in time, and runs the 
 law that it finds.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from loco_drake.common.arrays import Array
 from loco_drake.control.state import HEIGHT
 from loco_drake.control.state_change import change_between
+from loco_drake.tracking.guided_config import IlqrConfig
 from loco_drake.tracking.problem import TrackingProblem
 
 _LARGEST_CHANGE = 1.5  # of an action, from one iteration to the next
 _SHARES = (1.0, 0.5, 0.2, 0.07)  # of a step that are tried
 _LOWEST = 0.1  # m; a base that is lower has fallen
 # Damping of a step, which rises while steps fail, and falls.
-_DAMPING, _LEAST_DAMPING, _RISE, _TRIES = 0.05, 0.01, 4.0, 6
+_DAMPING, _LEAST_DAMPING, _RISE = 0.05, 0.01, 4.0
+# First with a linearization, and further on.
+_TRIES, _FURTHER_TRIES = 6, 2
 _ENOUGH = 1e-4  # least gain of a step, in cost
 
-
-@dataclass(kw_only=True)
-class IlqrConfig:
-    """How actions are improved."""
-
-    # Iterations at most.
-    iterations: int = 5
-    # Cost of the mean square of the actions.
-    effort: float = 0.02
-    # Cost of the mean square of their changes. Without it the actions alternate from
-    # period to period, which no policy learns.
-    change: float = 0.15
-    # Cost of actions that keeps the gains low.
-    gain_cost: float = 0.3
+Linear = list[tuple[Array, Array]]  # A and B of each action
 
 
 @dataclass(frozen=True)
@@ -45,19 +35,35 @@ class FeedbackLaw:
 
     ``states`` (T + 1, 13 + 2 J) are visited, ``actions`` (T, J) taken, ``previous``
     (J,) is the action before them, and ``gains`` (T, J, 12 + 3 J) multiply the change
-    of the state and then of the action before.
+    of the state and then of the action before. ``curvatures`` (T, J, J) say how much
+    another action costs: half its square.
     """
 
     states: Array
     actions: Array
     previous: Array
     gains: Array
+    curvatures: Array
     cost: float  # mean of a sample
     reward: float  # mean of a sample
+
+    def __len__(self) -> int:
+        """The number of actions."""
+        return len(self.actions)
 
     def before(self) -> Array:
         """Returns the action before each, (T, J)."""
         return np.vstack((self.previous, self.actions[:-1]))
+
+    def cut(self, length: int) -> "FeedbackLaw":
+        """Returns the law's first actions; cost and reward stay those of the whole."""
+        return replace(
+            self,
+            states=self.states[: length + 1],
+            actions=self.actions[:length],
+            gains=self.gains[:length],
+            curvatures=self.curvatures[:length],
+        )
 
 
 class Ilqr:
@@ -77,29 +83,40 @@ class Ilqr:
             actions: that lead from each to the next, shape (T, J).
             previous: the action before them, shape (J,).
         """
-        cost, _ = self._cost(first, states, actions, previous)
-        law, damping = None, _DAMPING
+        cost, reward = self._cost(first, states, actions, previous)
+        none = np.zeros((0, 0, 0))
+        law = FeedbackLaw(states, actions, previous, none, none, cost, reward)
+        damping = _DAMPING
         for _ in range(self._config.iterations):
-            pairs = zip(states[:-1], actions, strict=True)
+            pairs = zip(law.states[:-1], law.actions, strict=True)
             linear = [
                 self._problem.linearize(first + t + 1, x, u)
                 for t, (x, u) in enumerate(pairs)
             ]
-            for _ in range(_TRIES):
-                steps, gains = self._solve(
-                    first, states, actions, previous, linear, damping
-                )
-                base = FeedbackLaw(states, actions, previous, gains, cost, 0.0)
-                tried = [self._run(first, base, s * steps) for s in _SHARES]
-                best = min((x for x in tried if x), key=lambda x: x.cost, default=None)
-                if best is not None and best.cost < cost - _ENOUGH:
+            start = law
+            for k in range(self._config.steps):
+                tries = _TRIES if k == 0 else _FURTHER_TRIES
+                better, damping = self._step(first, law, linear, damping, tries)
+                if better is None:
                     break
-                damping *= _RISE
-            else:
-                return law
-            law, damping = best, max(damping / _RISE, _LEAST_DAMPING)
-            states, actions, cost = law.states, law.actions, law.cost
-        return law
+                law = better
+            if law is start:
+                break
+        return law if law.gains.size else None
+
+    def _step(
+        self, first: int, law: FeedbackLaw, linear: Linear, damping: float, tries: int
+    ) -> tuple[FeedbackLaw | None, float]:
+        """Returns a law that costs less, None if none is found, and the damping."""
+        for _ in range(tries):
+            steps, found = self._solve(first, law, linear, damping)
+            laws = (self._run(first, found, share * steps) for share in _SHARES)
+            standing = [x for x in laws if x is not None]
+            best = min(standing, key=lambda x: x.cost, default=law)
+            if best.cost < law.cost - _ENOUGH:
+                return best, max(damping / _RISE, _LEAST_DAMPING)
+            damping *= _RISE
+        return None, damping
 
     def _cost(
         self, first: int, states: Array, actions: Array, previous: Array
@@ -118,30 +135,26 @@ class Ilqr:
         for t, before in enumerate(law.before()):
             off = np.append(change_between(law.states[t], state), action - before)
             change = steps[t] + law.gains[t] @ off
-            action = law.actions[t] + np.clip(change, -_LARGEST_CHANGE, _LARGEST_CHANGE)
+            change = np.clip(change, -_LARGEST_CHANGE, _LARGEST_CHANGE)
+            action = law.actions[t] + change
             state = self._problem.next_state(first + t + 1, state, action)
             if not np.isfinite(state).all() or state[HEIGHT] < _LOWEST:
                 return None
             states.append(state)
             actions.append(action)
         visited, taken = np.array(states), np.array(actions)
-        own = self._cost(first, visited, taken, law.previous)
-        return FeedbackLaw(visited, taken, law.previous, law.gains, *own)
+        cost, reward = self._cost(first, visited, taken, law.previous)
+        return replace(law, states=visited, actions=taken, cost=cost, reward=reward)
 
     def _solve(
-        self,
-        first: int,
-        states: Array,
-        actions: Array,
-        previous: Array,
-        linear: list[tuple[Array, Array]],
-        damping: float,
-    ) -> tuple[Array, Array]:
-        """Returns steps (T, J) and gains (T, J, n + J) of the quadratic problem.
+        self, first: int, law: FeedbackLaw, linear: Linear, damping: float
+    ) -> tuple[Array, FeedbackLaw]:
+        """Returns steps (T, J), and the trajectory with the gains of the problem.
 
-        The state of the problem is the change of the robot's state, n numbers, and of
-        the action before.
+        The state of the quadratic problem is the change of the robot's state, n
+        numbers, and of the action before.
         """
+        states, actions, before = law.states, law.actions, law.before()
         T, joints = actions.shape
         n = linear[0][0].shape[0]
         eye = np.eye(joints)
@@ -149,11 +162,11 @@ class Ilqr:
             2 * cost / joints * eye
             for cost in (self._config.effort, self._config.change)
         )
-        before = np.vstack((previous, actions[:-1]))
         V, v = np.zeros((n + joints,) * 2), np.zeros(n + joints)
         v[:n], V[:n, :n] = self._problem.expand(first + T, states[T])
         steps = np.empty((T, joints))
         gains = np.empty((T, joints, n + joints))
+        curvatures = np.empty((T, joints, joints))
         for t in reversed(range(T)):
             A = np.zeros_like(V)
             A[:n, :n] = linear[t][0]
@@ -167,7 +180,7 @@ class Ilqr:
             Q_ux[:, n:] -= change
             k = -np.linalg.solve(Q_uu + damping * eye, Q_u)
             K = -np.linalg.solve(Q_uu + self._config.gain_cost * eye, Q_ux)
-            steps[t], gains[t] = k, K
+            steps[t], gains[t], curvatures[t] = k, K, Q_uu
             v = Q_x + K.T @ (Q_uu @ k + Q_u) + Q_ux.T @ k
             V = Q_xx + K.T @ Q_uu @ K + K.T @ Q_ux + Q_ux.T @ K
             V = (V + V.T) / 2
@@ -175,4 +188,4 @@ class Ilqr:
                 gradient, hessian = self._problem.expand(first + t, states[t])
                 v[:n] += gradient
                 V[:n, :n] += hessian
-        return steps, gains
+        return steps, replace(law, gains=gains, curvatures=curvatures)

@@ -7,7 +7,8 @@ from scipy.linalg import solve_discrete_are
 from loco_drake.control.reward import reward_terms
 from loco_drake.control.state_change import change_between, changed
 from loco_drake.tracking.config import EnvironmentConfig
-from loco_drake.tracking.ilqr import Ilqr, IlqrConfig
+from loco_drake.tracking.guided_config import IlqrConfig
+from loco_drake.tracking.ilqr import Ilqr
 from loco_drake.tracking.problem import TrackingProblem
 
 CHANGES = 12 + 2 * 12

@@ -1,0 +1,105 @@
+"""Better actions where a policy gets to, which it is then to learn.
+
+Guided policy search (Levine and Koltun 2013; Mordatch and Todorov 2014, "Combining the
+benefits of function approximation and trajectory optimization"): the policy tracks a
+plan for a while, iterative LQR improves its actions, and the feedback law that results
+tells what the policy should do there and beside it.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from loco_drake.common.determinism import single_thread
+from loco_drake.control.actor import Actor
+from loco_drake.control.actor_file import load_actor
+from loco_drake.control.plan import Plan
+from loco_drake.engine.executor import Executor
+from loco_drake.models.robots import get_simulated
+from loco_drake.tracking.batch import TrackingBatch
+from loco_drake.tracking.config import EnvironmentConfig
+from loco_drake.tracking.guided_config import FEWEST, StretchConfig
+from loco_drake.tracking.ilqr import FeedbackLaw, Ilqr
+from loco_drake.tracking.problem import TrackingProblem
+
+# A policy that loses its plan still finds a law on what it did until shortly before.
+_BEFORE_LOSS = 3  # samples
+
+
+@dataclass(frozen=True)
+class Found:
+    """A law of a plan, by its number, from a sample on."""
+
+    plan: int
+    sample: int
+    law: FeedbackLaw
+    before: float  # mean reward of a sample without the law
+
+
+def find_laws(
+    plans: list[Plan],
+    policy: Path,
+    environment: EnvironmentConfig,
+    config: StretchConfig,
+    seeds: Iterable[tuple[int, ...]],
+    executor: Executor,
+) -> Iterator[Found | None]:
+    """Yields what :func:`find_law` gives for each seed, in order."""
+    make = partial(_make_finder, plans, policy, environment, config)
+    return executor.map(make, seeds)
+
+
+def _make_finder(
+    plans: list[Plan],
+    policy: Path,
+    environment: EnvironmentConfig,
+    config: StretchConfig,
+) -> Callable[[tuple[int, ...]], Found | None]:
+    actor = load_actor(policy, get_simulated(environment.robot))
+    return partial(find_law, plans, actor, environment, config)
+
+
+def find_law(
+    plans: list[Plan],
+    actor: Actor,
+    environment: EnvironmentConfig,
+    config: StretchConfig,
+    seed: tuple[int, ...],
+) -> Found | None:
+    """Returns a law on a random stretch of a random plan; None if none is found.
+
+    The robot starts beside the plan, by the noise of the environment's starts. There is
+    no law where the policy loses the plan at once, or where no actions cost less.
+    """
+    random = np.random.default_rng(seed)
+    number = int(random.integers(len(plans)))
+    lead = int(random.integers(config.lead + 1) * (random.random() < config.lead_share))
+    length = len(plans[number])
+    first = int(random.integers(max(1, length - config.length - lead - 2)))
+    batch = TrackingBatch([plans[number]], environment, 1)
+    batch.reset(0, random, 0, first)
+    problem = TrackingProblem(plans[number], environment)
+    states, actions = [batch.states[0]], [np.zeros(problem.joints)]
+    for _ in range(min(lead + config.length, length - first - 2)):
+        with torch.inference_mode(), single_thread():
+            action = actor(torch.from_numpy(batch.observe())).numpy()
+        _, lost, _ = batch.step(action)
+        if lost[0]:
+            del states[-_BEFORE_LOSS:], actions[-_BEFORE_LOSS:]
+            break
+        states.append(batch.states[0])
+        actions.append(action[0].astype(np.float64))
+    kept = len(states) - 1 - lead - config.tail
+    if kept < FEWEST:
+        return None
+    start = first + lead
+    visited, taken = np.array(states[lead:]), np.array(actions[lead + 1 :])
+    law = Ilqr(problem, config.ilqr).improve(start, visited, taken, actions[lead])
+    if law is None:
+        return None
+    before = float(problem.rewards(start + 1, visited[1:]).mean())
+    return Found(number, start, law.cut(kept), before)

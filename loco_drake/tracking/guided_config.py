@@ -1,0 +1,112 @@
+"""Configuration of guided policy search; also the command's options."""
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import tyro
+
+from loco_drake.common.errors import check_at_least, check_bounds
+from loco_drake.control.state import TerminationConfig
+from loco_drake.models.plant import PlantConfig
+from loco_drake.tracking.config import EnvironmentConfig, ResetNoise
+
+FEWEST = 25  # samples of a law
+
+
+@dataclass(kw_only=True)
+class IlqrConfig:
+    """How actions are improved."""
+
+    # Linearizations of the physics at most.
+    iterations: int = 5
+    # Steps with each of them at most.
+    steps: int = 3
+    # Cost of the mean square of the actions.
+    effort: float = 0.02
+    # Cost of the mean square of their changes. Without it the actions alternate from
+    # period to period, which no policy learns.
+    change: float = 0.15
+    # Cost of actions that keeps the gains low.
+    gain_cost: float = 0.3
+
+
+@dataclass(kw_only=True)
+class StretchConfig:
+    """The stretches of plans on which laws are found."""
+
+    # Control periods that are optimized together.
+    length: int = 110
+    # Of these, those at the end whose law is dropped: it knows nothing of what follows.
+    tail: int = 15
+    # Control periods that the policy tracks before, at most.
+    lead: int = 30
+    # Share of the stretches that have a lead; the others start beside the plan.
+    lead_share: float = 0.25
+    # Iterative LQR: one linearization, since the policy comes back with another motion.
+    ilqr: IlqrConfig = field(default_factory=lambda: IlqrConfig(iterations=1))
+
+    def check(self) -> None:
+        """Raises InputError unless laws can be found."""
+        check_at_least("stretch.length", self.length, FEWEST + self.tail)
+        check_at_least("stretch.tail", self.tail, 0)
+        check_at_least("stretch.lead", self.lead, 0)
+        check_bounds("--stretch.lead-share", self.lead_share, 0, 1)
+        for name in ("iterations", "steps"):
+            check_at_least(f"stretch.ilqr.{name}", getattr(self.ilqr, name), 1)
+        for name in ("effort", "change", "gain_cost"):
+            option = f"--stretch.ilqr.{name.replace('_', '-')}"
+            check_bounds(option, getattr(self.ilqr, name), 0, above=True)
+
+
+@dataclass(kw_only=True)
+class GuidedConfig:
+    """Configuration of guided policy search."""
+
+    # Number of training steps: rounds, in each of which laws are found along what the
+    # policy does, and it learns them.
+    steps: int = 6
+    # Stretches of a round.
+    stretches: int = 300
+    # Number of worker processes.
+    workers: int = 2
+    # Seed: of all random numbers.
+    seed: int = 0
+    # Updates of a round.
+    updates: int = 5000
+    # Samples in a minibatch.
+    minibatch: int = 512
+    # Learning rate: the initial one of a round, which decays to 0 as a half cosine.
+    learning_rate: float = 7e-4
+    # Samples that are kept to learn from.
+    capacity: int = 120_000
+    # Where laws are found.
+    stretch: StretchConfig = field(default_factory=StretchConfig)
+    # Robot: go2, a1, or a YAML file, see docs/own_robot.md; or g1, see
+    # docs/humanoid.md.
+    robot: Annotated[str, tyro.conf.arg(metavar="ROBOT|FILE")] = "go2"
+    # Contact solver, time step and friction.
+    plant: PlantConfig = field(default_factory=PlantConfig)
+    # Distance from the plan at which the policy has lost it.
+    termination: TerminationConfig = field(
+        default_factory=lambda: TerminationConfig(position=1.5, rotation=1.2)
+    )
+    # Standard deviations of the initial state about the plan.
+    reset_noise: ResetNoise = field(default_factory=ResetNoise)
+
+    @property
+    def environment(self) -> EnvironmentConfig:
+        """The world in which laws are found: the model's."""
+        return EnvironmentConfig(
+            robot=self.robot,
+            plant=self.plant,
+            termination=self.termination,
+            reset_noise=self.reset_noise,
+        )
+
+    def check(self) -> None:
+        """Raises InputError unless a training can begin."""
+        for name in ("stretches", "workers", "updates", "minibatch", "capacity"):
+            check_at_least(name, getattr(self, name), 1)
+        check_bounds("--learning-rate", self.learning_rate, 0, 1, above=True)
+        self.stretch.check()
+        self.environment.check()

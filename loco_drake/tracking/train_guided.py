@@ -1,0 +1,221 @@
+"""Training by guided policy search, from a policy to a better one; resumable."""
+
+import hashlib
+import json
+import math
+import shutil
+import time
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from statistics import fmean
+from threading import Event
+from typing import Any
+
+import numpy as np
+import torch
+
+from loco_drake.common import run_folder
+from loco_drake.common.determinism import single_thread
+from loco_drake.common.errors import InputError
+from loco_drake.common.files import atomic_path
+from loco_drake.common.weights import load_into
+from loco_drake.control.actor import Actor
+from loco_drake.control.actor_file import read_actor, save_actor
+from loco_drake.control.plan import Plan
+from loco_drake.engine.executor import Executor
+from loco_drake.engine.local import LOCAL
+from loco_drake.models.robots import get_simulated
+from loco_drake.motion.gaits import ROW_LABELS
+from loco_drake.tracking.guidance import Found, find_laws
+from loco_drake.tracking.guided_config import GuidedConfig
+from loco_drake.tracking.joining import joined, near_of, recovery_of
+from loco_drake.tracking.laws import Laws, law_loss, load_found, save_found
+from loco_drake.tracking.learning_curve import PROGRESS
+from loco_drake.tracking.train import POLICY, Report
+
+NAME = "guided"
+_LAWS = "laws"  # folder of the laws
+_START = "start.safetensors"  # the policy to begin with
+_NEAR = "near.safetensors"  # the network that acts, while laws are found
+
+
+def train_guided(
+    plans: list[Plan],
+    first: Path | None,
+    config: GuidedConfig,
+    folder: Path,
+    *,
+    resume: bool = False,
+    options: Mapping[str, Any] | None = None,
+    report: Report = lambda steps, scores: None,
+    executor: Executor = LOCAL,
+) -> dict[str, Any]:
+    """Improves the network of a policy that acts near the plan.
+
+    What acts far from the plan stays. After each round it writes the files of
+    :func:`.train.train_tracker` but for TensorBoard's to ``folder``; laws are written
+    there one by one, so an interruption, or being killed, loses seconds of finding laws
+    or minutes of learning.
+
+    Args:
+        plans: what to follow.
+        first: file of a policy to begin with, of the same robot, without a memory;
+            None to resume.
+        config: how to train.
+        folder: for the results.
+        resume: go on from the checkpoint in ``folder``.
+        options: of the command, for :func:`.run_folder.open_run`.
+        report: called after each round, with the returns before the laws.
+        executor: where laws are found; the results do not depend on it.
+
+    Returns:
+        robot, steps (rounds), wall_clock_s, interrupted, scores by label, and rounds:
+        what each one found and learned.
+
+    Raises:
+        InputError: see :func:`.run_folder.open_run`; or if the policy is missing, of
+            another robot, or has a memory.
+        ChildProcessError: if workers die several times at the same stretch.
+    """
+    config.check()
+    robot = get_simulated(config.environment.robot)
+    path = first or Path(folder) / _START
+    begun, learner = read_actor(path)
+    if begun.config.robot != robot.name or begun.config.history is not None:
+        raise InputError(
+            f"The policy in {path} must be one of {robot.name} without a memory."
+        )
+    own = run_folder.options_of(config)
+    own = {field.name: own[field.name] for field in fields(GuidedConfig)}
+    run = {
+        **run_folder.settings(own, "steps", "workers"),
+        "references": f"{len(plans)} motions of {sum(map(len, plans))} samples",
+        "first_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+    }
+    start = time.monotonic()
+    with (
+        single_thread(),
+        run_folder.open_run(
+            Path(folder),
+            NAME,
+            POLICY,
+            run,
+            steps=config.steps,
+            resume=resume,
+            options=options or own,
+        ) as held,
+        run_folder.stop_requests() as stop,
+    ):
+        near = near_of(begun)
+        rounds: list[dict[str, Any]] = []
+        if held.saved is not None:
+            rounds = list(held.saved.state["rounds"])
+            load_into(near, run_folder.networks(held.saved), held.path)
+        else:
+            with atomic_path(Path(folder) / _START) as temporary:
+                shutil.copyfile(path, temporary)
+            held.save(_tensors(near), {"steps": 0, "rounds": []})
+        before: dict[str, float] = {}
+        laws = Laws(robot, plans, config.capacity)
+        for past in range(len(rounds)):
+            for file in sorted(_of_round(folder, past).glob("*.safetensors")):
+                laws.add(load_found(file))
+        while len(rounds) < config.steps and not stop.is_set():
+            number = len(rounds)
+            save_actor(near, folder / _NEAR)
+            found = _find(plans, config, folder, number, executor, stop)
+            if found is None:
+                break
+            for one in found:
+                laws.add(one)
+            loss = _learn(near, laws, config, number)
+            seconds = time.monotonic() - start
+            line = {"steps": number + 1, "seconds": seconds, "train/loss": loss}
+            before, after = _returns(plans, found)
+            line["train/laws"] = len(found)
+            line |= {f"return/{label}": x for label, x in before.items()}
+            line |= {f"improved/{label}": x for label, x in after.items()}
+            rounds.append(line)
+            held.save(_tensors(near), {"steps": len(rounds), "rounds": rounds})
+            recovery = recovery_of(begun)
+            policy = near if recovery is None else joined(near, recovery)
+            save_actor(policy, folder / POLICY, learner=learner)
+            with (folder / PROGRESS).open("w") as log:
+                log.writelines(json.dumps(one) + "\n" for one in rounds)
+            report(len(rounds), before)
+    return {
+        "robot": robot.name,
+        "steps": len(rounds),
+        "wall_clock_s": time.monotonic() - start,
+        "interrupted": len(rounds) < config.steps,
+        "scores": before,
+        "rounds": rounds,
+    }
+
+
+def _of_round(folder: Path, number: int) -> Path:
+    return Path(folder) / _LAWS / f"{number + 1:03d}"
+
+
+def _tensors(near: Actor) -> dict[str, torch.Tensor]:
+    return {f"module/{name}": value for name, value in near.state_dict().items()}
+
+
+def _find(
+    plans: list[Plan],
+    config: GuidedConfig,
+    folder: Path,
+    number: int,
+    executor: Executor,
+    stop: Event,
+) -> list[Found] | None:
+    """Finds the laws of a round that are not found yet; None if it is stopped."""
+    into = _of_round(folder, number)
+    into.mkdir(parents=True, exist_ok=True)
+    paths = [into / f"{i:05d}.safetensors" for i in range(config.stretches)]
+    missing = [i for i, path in enumerate(paths) if not path.is_file()]
+    seeds = [(config.seed, number, i) for i in missing]
+    near = folder / _NEAR
+    found = find_laws(plans, near, config.environment, config.stretch, seeds, executor)
+    for i, one in zip(missing, found, strict=True):
+        if one is not None:
+            save_found(paths[i], one)
+        if stop.is_set():
+            return None
+    # As they are stored, whether or not the training was interrupted.
+    return [load_found(path) for path in paths if path.is_file()]
+
+
+def _learn(near: Actor, laws: Laws, config: GuidedConfig, number: int) -> float:
+    """Learns the laws; returns the mean loss of the last tenth of the updates."""
+    random = np.random.default_rng((config.seed, number))
+    near.requires_grad_(True)
+    optimizer = torch.optim.Adam(near.layers.parameters(), lr=config.learning_rate)
+    losses = []
+    for update in range(config.updates):
+        for group in optimizer.param_groups:
+            share = (1 + math.cos(math.pi * update / config.updates)) / 2
+            group["lr"] = config.learning_rate * share
+        seen, told, weights = laws.draw(random, config.minibatch)
+        loss = law_loss(near(seen), told, weights)
+        optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        optimizer.step()
+        losses.append(loss.item())
+    near.requires_grad_(False)
+    return fmean(losses[-math.ceil(len(losses) / 10) :])
+
+
+def _returns(
+    plans: list[Plan], found: list[Found]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Returns normalized returns by label, 0-100: before the laws, and with them."""
+    before: dict[str, list[float]] = {}
+    after: dict[str, list[float]] = {}
+    for one in found:
+        label = str(ROW_LABELS[int(plans[one.plan].labels[0])])
+        before.setdefault(label, []).append(100 * one.before)
+        after.setdefault(label, []).append(100 * one.law.reward)
+    means = [{x: fmean(of[x]) for x in sorted(of)} for of in (before, after)]
+    return means[0], means[1]
