@@ -28,8 +28,8 @@ class TrainGuided(GuidedConfig, EngineOptions):
     start_from: Annotated[
         Path | None,
         option(
-            f"Policy to improve: a shipped one, {SHIPPED}; or the policy.safetensors "
-            "of a run.",
+            f"Networks to start from: a shipped policy, {SHIPPED}; or the "
+            "policy.safetensors of a run.",
             metavar="POLICY|FILE",
             default="the robot's main policy",
         ),
