@@ -228,7 +228,7 @@ class StudentConfig:
     batch: int = 4096
     # Samples in a minibatch.
     minibatch: int = 512
-    # Updates per batch.
+    # Number of updates: per batch.
     updates: int = 128
     # Learning rate: the initial one, which decays to 0 as a half cosine.
     learning_rate: float = 1e-3

@@ -71,7 +71,7 @@ class GuidedConfig:
     workers: int = 2
     # Seed: of all random numbers.
     seed: int = 0
-    # Updates of a round.
+    # Number of updates: in a round.
     updates: int = 5000
     # Samples in a minibatch.
     minibatch: int = 512
