@@ -38,6 +38,7 @@ class Found:
     sample: int
     law: FeedbackLaw
     before: float  # mean reward of a sample without the law
+    periods: int  # control periods that were simulated to find it
 
 
 def find_laws(
@@ -102,4 +103,5 @@ def find_law(
     if law is None:
         return None
     before = float(problem.rewards(start + 1, visited[1:]).mean())
-    return Found(number, start, law.cut(kept), before)
+    periods = problem.periods + lead + len(taken)
+    return Found(number, start, law.cut(kept), before, periods)

@@ -38,9 +38,9 @@ def save_found(path: Path, found: Found) -> None:
         name: torch.from_numpy(getattr(law, name).astype(np.float32))
         for name in _ARRAYS
     }
+    whole = {name: getattr(found, name) for name in ("plan", "sample", "periods")}
     others = {"cost": law.cost, "reward": law.reward, "before": found.before}
-    header = {"plan": found.plan, "sample": found.sample, **others}
-    save_weights(path, KIND, tensors, header)
+    save_weights(path, KIND, tensors, {**whole, **others})
 
 
 def load_found(path: Path) -> Found:
@@ -55,8 +55,11 @@ def load_found(path: Path) -> Found:
         cost, reward, before = (
             float(header[name]) for name in ("cost", "reward", "before")
         )
+        plan, sample, periods = (
+            int(header[name]) for name in ("plan", "sample", "periods")
+        )
         law = FeedbackLaw(**arrays, cost=cost, reward=reward)
-        return Found(int(header["plan"]), int(header["sample"]), law, before)
+        return Found(plan, sample, law, before, periods)
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,9 +37,11 @@ class TrackingProblem:
         joints = len(robot.joint_names)
         self._steps = np.repeat(_STEPS, (3, 3, joints, 3, 3, joints))
         self.joints = joints
+        self.periods = 0  # simulated so far
 
     def next_state(self, sample: int, state: Array, action: Array) -> Array:
         """Returns the state at ``sample`` after that at the sample before."""
+        self.periods += 1
         desired = joint_targets(self._set_points[sample], action)
         after: Array = unit_base(self._world.advance(state, desired)[None])[0]
         return after

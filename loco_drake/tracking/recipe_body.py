@@ -23,7 +23,7 @@ from loco_drake.motion.motion_file import save_motion
 from loco_drake.retargeting.inverse_kinematics import LegSolver
 from loco_drake.retargeting.robot_clip import retarget_motion
 from loco_drake.retargeting.scaling import Variant
-from loco_drake.tracking.recipe import Body
+from loco_drake.tracking.recipe_parts import Body
 
 KNOWN = "go2"  # the robot whose motion is retargeted
 _WEIGHTS = "tokenizer.safetensors"

@@ -12,7 +12,8 @@ from loco_drake.control.plan import Plan
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion import FPS
 from loco_drake.tracking.exact_return import exact_returns
-from loco_drake.tracking.recipe import Evaluation, Recipe
+from loco_drake.tracking.recipe import Recipe
+from loco_drake.tracking.recipe_parts import Evaluation
 from loco_drake.tracking.references import load_references
 
 RESULT = "result"  # stands for the stage of a policy of two stages' networks

@@ -16,7 +16,7 @@ from loco_drake.models.shipped import network_path
 from loco_drake.motion.motion import FPS
 from loco_drake.motion.motion_file import save_motion
 from loco_drake.retargeting.inverse_kinematics import LegSolver
-from loco_drake.tracking.recipe import ReferenceSet
+from loco_drake.tracking.recipe_parts import ReferenceSet
 from loco_drake.tracking.references import read_motions
 
 # Says what a folder holds, and whether all of it is there.

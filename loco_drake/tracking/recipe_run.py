@@ -14,18 +14,12 @@ from loco_drake.common.files import atomic_path, write_json
 from loco_drake.common.run_folder import CHECKPOINT, locked, stop_requests
 from loco_drake.control.actor_file import halve_policy
 from loco_drake.control.plan import Plan
+from loco_drake.engine.local import Local
 from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import training_path
 from loco_drake.tracking.beginning import read_beginning
 from loco_drake.tracking.joining import join_policies
-from loco_drake.tracking.recipe import (
-    BODY,
-    EVALUATION,
-    Recipe,
-    Stage,
-    read_recipe,
-    write_recipe,
-)
+from loco_drake.tracking.recipe import Recipe, read_recipe, write_recipe
 from loco_drake.tracking.recipe_body import knows, make_body, tokenizer_in
 from loco_drake.tracking.recipe_evaluation import Evaluator
 from loco_drake.tracking.recipe_folder import (
@@ -41,9 +35,11 @@ from loco_drake.tracking.recipe_folder import (
     recipe_curve,
     stage_folder,
 )
+from loco_drake.tracking.recipe_parts import BODY, EVALUATION, Stage
 from loco_drake.tracking.recipe_references import make_references
 from loco_drake.tracking.references import load_references
 from loco_drake.tracking.train import POLICY, train_tracker
+from loco_drake.tracking.train_guided import train_guided
 
 # What must be the same if a run goes on.
 _WHOLE = ("robot", "seed", "environments", "start_from", "before", "body")
@@ -252,8 +248,8 @@ class _Run:
         resume = (folder / CHECKPOINT).is_file()
         earlier = self.recipe.before_stage(index)
         if not resume and earlier is not None:
-            # Not its policy, which a kill may have left a batch behind.
-            first = self.stage_folder(earlier) / CHECKPOINT
+            guided = self.recipe.stages[earlier].guided is not None
+            first = self.stage_folder(earlier) / (POLICY if guided else CHECKPOINT)
         elif not resume and (self.folder / START).is_file():
             first = self.folder / START
 
@@ -268,10 +264,7 @@ class _Run:
             if self.evaluator and self.evaluator.is_due(before + steps):
                 self.evaluator.evaluate(before + steps, index, folder / POLICY)
 
-        config = self.recipe.training(index, self.workers)
-        figures = train_tracker(
-            plans, config, folder, resume=resume, first=first, report=report
-        )
+        figures = self._train(index, stage, plans, first, report)
         if figures["interrupted"]:
             return False
         if self.evaluator:
@@ -279,6 +272,37 @@ class _Run:
             self.evaluator.evaluate(steps, index, folder / POLICY)
         write_json(folder / FIGURES, figures)
         return True
+
+    def _train(
+        self,
+        index: int,
+        stage: Stage,
+        plans: list[Plan],
+        first: Path | None,
+        report: Callable[[int, dict[str, float]], None],
+    ) -> dict[str, Any]:
+        """Begins a stage with ``first``, or goes on if that is None."""
+        folder = self.stage_folder(index)
+        resume = (folder / CHECKPOINT).is_file()
+        if stage.guided is None:
+            config = self.recipe.training(index, self.workers)
+            return train_tracker(
+                plans, config, folder, resume=resume, first=first, report=report
+            )
+        if first is not None and first.name == CHECKPOINT:
+            first = first.with_name(POLICY)
+        guided = self.recipe.guided(index, self.workers)
+        figures = train_guided(
+            plans,
+            first,
+            guided,
+            folder,
+            resume=resume,
+            report=report,
+            executor=Local(self.workers),
+        )
+        # What it costs, as other stages have it.
+        return {**figures, "rounds": figures["steps"], "steps": figures["periods"]}
 
     def _steps_before(self, index: int) -> int:
         folder, own = (

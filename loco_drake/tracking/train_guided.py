@@ -70,8 +70,9 @@ def train_guided(
         executor: where laws are found; the results do not depend on it.
 
     Returns:
-        robot, steps (rounds), wall_clock_s, interrupted, scores by label, and rounds:
-        what each one found and learned.
+        robot, steps (rounds), periods (control periods that were simulated to find
+        laws), wall_clock_s, interrupted, scores by label, and rounds: what each one
+        found and learned.
 
     Raises:
         InputError: see :func:`.run_folder.open_run`; or if the policy is missing, of
@@ -131,7 +132,10 @@ def train_guided(
                 laws.add(one)
             loss = _learn(near, laws, config, number)
             seconds = time.monotonic() - start
-            line = {"steps": number + 1, "seconds": seconds, "train/loss": loss}
+            periods = rounds[-1]["steps"] if rounds else 0
+            periods += sum(one.periods for one in found)
+            line = {"round": number + 1, "steps": periods, "seconds": seconds}
+            line["train/loss"] = loss
             before, after = _returns(plans, found)
             line["train/laws"] = len(found)
             line |= {f"return/{label}": x for label, x in before.items()}
@@ -147,6 +151,7 @@ def train_guided(
     return {
         "robot": robot.name,
         "steps": len(rounds),
+        "periods": rounds[-1]["steps"] if rounds else 0,
         "wall_clock_s": time.monotonic() - start,
         "interrupted": len(rounds) < config.steps,
         "scores": before,

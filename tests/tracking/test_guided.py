@@ -84,11 +84,8 @@ def test_law_files_hold_32_bits(found, tmp_path):
     path = tmp_path / "law.safetensors"
     save_found(path, found)
     read = load_found(path)
-    assert (read.plan, read.sample, read.before) == (
-        found.plan,
-        found.sample,
-        found.before,
-    )
+    names = ("plan", "sample", "before", "periods")
+    assert all(getattr(read, name) == getattr(found, name) for name in names)
     assert read.law.gains == pytest.approx(found.law.gains, rel=1e-6)
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(InputError):
@@ -155,7 +152,12 @@ def test_it_learns_and_leaves_the_other_network(trained):
     assert (second["steps"], second["interrupted"]) == (2, False)
     text = (folder / "progress.jsonl").read_text()
     lines = [json.loads(line) for line in text.splitlines()]
-    assert [line["steps"] for line in lines] == [1, 2]
+    assert [line["round"] for line in lines] == [1, 2]
+    # Of each of the four laws: 34 periods of the policy, some of them twice, 97 of
+    # each that is linearized, and up to 24 runs of the law.
+    periods = second["periods"]
+    assert periods == lines[-1]["steps"]
+    assert 4 * 31 * 98 < periods < 4 * 37 * (98 + 25)
     start, learner = read_actor(START)
     now, kept = read_actor(folder / "policy.safetensors")
     assert all((learner[name] == kept[name]).all() for name in learner)

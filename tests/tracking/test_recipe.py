@@ -10,12 +10,11 @@ from loco_drake.motion.gaits import LABELS
 from loco_drake.tracking.config import EnvironmentConfig, PpoConfig, TrainingConfig
 from loco_drake.tracking.recipe import (
     Recipe,
-    ReferenceSet,
-    Stage,
     read_recipe,
     scaled,
     write_recipe,
 )
+from loco_drake.tracking.recipe_parts import ReferenceSet, Stage
 
 TEXT = """
 robot: a1
@@ -92,6 +91,34 @@ def test_shipped_recipes_need_no_more_steps_than_their_budget(robot):
     assert recipe.robot == robot
     stages = [*recipe.stages, *(recipe.before.read().stages if recipe.before else [])]
     assert sum(stage.steps for stage in stages) <= 60_000_000
+
+
+def test_a_guided_stage_has_the_options_of_train_guided(recipe):
+    guided = {"stretches": 200, "stretch": {"length": 80}, "learning_rate": "1e-4"}
+    recipe.stages[1].guided, recipe.stages[1].steps = guided, 3
+    recipe.check()
+    found = recipe.guided(1, workers=3)
+    assert (found.robot, found.seed, found.workers, found.steps) == ("a1", 6, 3, 3)
+    assert (found.stretches, found.stretch.length) == (200, 80)
+    assert (found.stretch.tail, found.learning_rate) == (15, 1e-4)
+    part = scaled(recipe, 0.01).stages[1]
+    assert (part.steps, part.guided["stretches"], part.guided["updates"]) == (1, 2, 50)
+    assert "updates" not in guided
+
+
+@pytest.mark.parametrize(
+    ("stage", "guided", "said"),
+    [
+        (0, {}, "The first stage has no policy that it could guide"),
+        (1, {"batch": 64}, "Stage 'second': it has the unknown field 'batch'"),
+        (1, {"robot": "go2"}, "robot is no option of a stage's guided search"),
+        (1, {"stretch": {"length": 10}}, "length must be 40 or more, not 10"),
+    ],
+)
+def test_guided_stages_that_are_wrong(recipe, stage, guided, said):
+    recipe.stages[stage].guided = guided
+    with pytest.raises(InputError, match=said):
+        recipe.check()
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,9 @@ from loco_drake.generation.tokenizer import load_tokenizer
 from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import pretrained_path, weights_in
 from loco_drake.motion.motion_file import load_motion
-from loco_drake.tracking.recipe import Body, Recipe, ReferenceSet, Stage
+from loco_drake.tracking.recipe import Recipe
 from loco_drake.tracking.recipe_body import knows, make_body
+from loco_drake.tracking.recipe_parts import Body, ReferenceSet, Stage
 from loco_drake.tracking.recipe_run import run_recipe
 from tests.robot_files import without_weights
 

@@ -12,23 +12,19 @@ import pytest
 import torch
 
 from loco_drake.common.errors import InputError
+from loco_drake.common.files import read_json
 from loco_drake.common.run_folder import locked, read_checkpoint
-from loco_drake.control.actor_file import load_actor
+from loco_drake.control.actor_file import load_actor, read_actor
 from loco_drake.control.observation import OBSERVATION_SIZE
 from loco_drake.models.plant import PlantConfig
 from loco_drake.models.robots import get_robot
 from loco_drake.motion.motion_file import load_motion
 from loco_drake.tracking.exact_return import exact_returns
 from loco_drake.tracking.joining import recovery_of
-from loco_drake.tracking.recipe import (
-    Before,
-    Evaluation,
-    Recipe,
-    ReferenceSet,
-    Stage,
-    read_recipe,
-)
+from loco_drake.tracking.laws import load_found
+from loco_drake.tracking.recipe import Before, Recipe, read_recipe
 from loco_drake.tracking.recipe_folder import recipe_curve
+from loco_drake.tracking.recipe_parts import Evaluation, ReferenceSet, Stage
 from loco_drake.tracking.recipe_references import make_references
 from loco_drake.tracking.recipe_run import run_recipe
 from loco_drake.tracking.references import load_references
@@ -97,6 +93,32 @@ def ended(recipe, tmp_path_factory):
     """A recipe that was never interrupted."""
     folder = tmp_path_factory.mktemp("recipe") / "run"
     return folder, run_recipe(folder, recipe)
+
+
+def test_a_guided_stage_between_two(recipe, tmp_path):
+    """Its networks are those of the policy before, and the next stage begins there."""
+    stretch = {"length": 30, "tail": 4, "lead": 0, "ilqr": {"iterations": 1}}
+    options = {"stretches": 2, "updates": 20, "minibatch": 32, "stretch": stretch}
+    shown = Stage(name="shown", steps=1, guided=options, references=["plain"])
+    stages = [recipe.stages[0], shown, replace(recipe.stages[1], steps=64)]
+    figures = run_recipe(tmp_path / "run", replace(recipe, stages=stages))
+    folder = tmp_path / "run"
+    laws = sorted((folder / "2-shown" / "laws" / "001").iterdir())
+    assert laws
+    begun = read_actor(folder / "2-shown" / "start.safetensors")[0].state_dict()
+    first = read_actor(folder / "1-first" / POLICY)[0].state_dict()
+    assert all((begun[name] == first[name]).all() for name in begun)
+    periods = read_json(folder / "2-shown" / "figures.json")["steps"]
+    assert periods == sum(load_found(path).periods for path in laws)
+    assert figures["steps"] == 192 + periods + 64
+    shown, last = (
+        read_actor(folder / name / POLICY)[0].layers[0].weight.detach()
+        for name in ("2-shown", "3-second")
+    )
+    assert 0 < (last - shown).abs().max() < 0.02
+    assert (shown - read_actor(folder / "1-first" / POLICY)[0].layers[0].weight).any()
+    again = run_recipe(folder, resume=True)
+    assert again["steps"] == figures["steps"]
 
 
 def contents(folder):
