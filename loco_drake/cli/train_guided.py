@@ -15,8 +15,8 @@ class TrainGuided(GuidedConfig, EngineOptions):
     """Improve a policy with what iterative LQR finds in the physics (guided search).
 
     The policy tracks stretches of motion, iterative LQR improves its actions there, and
-    the policy learns the feedback laws that result. What acts far from the plan stays.
-    Ctrl-C stops the training; --resume continues it.
+    the policy learns the feedback laws that result. Ctrl-C stops the training; --resume
+    continues it.
     """
 
     NAME: ClassVar[str] = "guided"

@@ -29,7 +29,6 @@ from loco_drake.models.robots import get_simulated
 from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.tracking.guidance import Found, find_laws
 from loco_drake.tracking.guided_config import GuidedConfig
-from loco_drake.tracking.joining import joined, near_of, recovery_of
 from loco_drake.tracking.laws import Laws, law_loss, load_found, save_found
 from loco_drake.tracking.learning_curve import PROGRESS
 from loco_drake.tracking.train import POLICY, Report
@@ -37,7 +36,7 @@ from loco_drake.tracking.train import POLICY, Report
 NAME = "guided"
 _LAWS = "laws"  # folder of the laws
 _START = "start.safetensors"  # the policy to begin with
-_NEAR = "near.safetensors"  # the network that acts, while laws are found
+_ACTING = "acting.safetensors"  # the policy that acts while laws are found
 
 
 def train_guided(
@@ -51,9 +50,9 @@ def train_guided(
     report: Report = lambda steps, scores: None,
     executor: Executor = LOCAL,
 ) -> dict[str, Any]:
-    """Improves the network of a policy that acts near the plan.
+    """Improves a policy: its network, or both if one acts far from the plan.
 
-    What acts far from the plan stays. After each round it writes the files of
+    After each round it writes the files of
     :func:`.train.train_tracker` but for TensorBoard's to ``folder``; laws are written
     there one by one, so an interruption, or being killed, loses seconds of finding laws
     or minutes of learning.
@@ -82,8 +81,8 @@ def train_guided(
     config.check()
     robot = get_simulated(config.environment.robot)
     path = first or Path(folder) / _START
-    begun, learner = read_actor(path)
-    if begun.config.robot != robot.name or begun.config.history is not None:
+    policy, learner = read_actor(path)
+    if policy.config.robot != robot.name or policy.config.history is not None:
         raise InputError(
             f"The policy in {path} must be one of {robot.name} without a memory."
         )
@@ -108,15 +107,14 @@ def train_guided(
         ) as held,
         run_folder.stop_requests() as stop,
     ):
-        near = near_of(begun)
         rounds: list[dict[str, Any]] = []
         if held.saved is not None:
             rounds = list(held.saved.state["rounds"])
-            load_into(near, run_folder.networks(held.saved), held.path)
+            load_into(policy, run_folder.networks(held.saved), held.path)
         else:
             with atomic_path(Path(folder) / _START) as temporary:
                 shutil.copyfile(path, temporary)
-            held.save(_tensors(near), {"steps": 0, "rounds": []})
+            held.save(_tensors(policy), {"steps": 0, "rounds": []})
         before: dict[str, float] = {}
         laws = Laws(robot, plans, config.capacity)
         for past in range(len(rounds)):
@@ -124,13 +122,13 @@ def train_guided(
                 laws.add(load_found(file))
         while len(rounds) < config.steps and not stop.is_set():
             number = len(rounds)
-            save_actor(near, folder / _NEAR)
+            save_actor(policy, folder / _ACTING)
             found = _find(plans, config, folder, number, executor, stop)
             if found is None:
                 break
             for one in found:
                 laws.add(one)
-            loss = _learn(near, laws, config, number)
+            loss = _learn(policy, laws, config, number)
             seconds = time.monotonic() - start
             periods = rounds[-1]["steps"] if rounds else 0
             periods += sum(one.periods for one in found)
@@ -141,9 +139,7 @@ def train_guided(
             line |= {f"return/{label}": x for label, x in before.items()}
             line |= {f"improved/{label}": x for label, x in after.items()}
             rounds.append(line)
-            held.save(_tensors(near), {"steps": len(rounds), "rounds": rounds})
-            recovery = recovery_of(begun)
-            policy = near if recovery is None else joined(near, recovery)
+            held.save(_tensors(policy), {"steps": len(rounds), "rounds": rounds})
             save_actor(policy, folder / POLICY, learner=learner)
             with (folder / PROGRESS).open("w") as log:
                 log.writelines(json.dumps(one) + "\n" for one in rounds)
@@ -163,8 +159,8 @@ def _of_round(folder: Path, number: int) -> Path:
     return Path(folder) / _LAWS / f"{number + 1:03d}"
 
 
-def _tensors(near: Actor) -> dict[str, torch.Tensor]:
-    return {f"module/{name}": value for name, value in near.state_dict().items()}
+def _tensors(policy: Actor) -> dict[str, torch.Tensor]:
+    return {f"module/{name}": value for name, value in policy.state_dict().items()}
 
 
 def _find(
@@ -181,8 +177,10 @@ def _find(
     paths = [into / f"{i:05d}.safetensors" for i in range(config.stretches)]
     missing = [i for i, path in enumerate(paths) if not path.is_file()]
     seeds = [(config.seed, number, i) for i in missing]
-    near = folder / _NEAR
-    found = find_laws(plans, near, config.environment, config.stretch, seeds, executor)
+    acting = folder / _ACTING
+    found = find_laws(
+        plans, acting, config.environment, config.stretch, seeds, executor
+    )
     for i, one in zip(missing, found, strict=True):
         if one is not None:
             save_found(paths[i], one)
@@ -192,23 +190,23 @@ def _find(
     return [load_found(path) for path in paths if path.is_file()]
 
 
-def _learn(near: Actor, laws: Laws, config: GuidedConfig, number: int) -> float:
+def _learn(policy: Actor, laws: Laws, config: GuidedConfig, number: int) -> float:
     """Learns the laws; returns the mean loss of the last tenth of the updates."""
     random = np.random.default_rng((config.seed, number))
-    near.requires_grad_(True)
-    optimizer = torch.optim.Adam(near.layers.parameters(), lr=config.learning_rate)
+    policy.requires_grad_(True)
+    optimizer = torch.optim.Adam(policy.parameters(), lr=config.learning_rate)
     losses = []
     for update in range(config.updates):
         for group in optimizer.param_groups:
             share = (1 + math.cos(math.pi * update / config.updates)) / 2
             group["lr"] = config.learning_rate * share
         seen, told, weights = laws.draw(random, config.minibatch)
-        loss = law_loss(near(seen), told, weights)
+        loss = law_loss(policy(seen), told, weights)
         optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         optimizer.step()
         losses.append(loss.item())
-    near.requires_grad_(False)
+    policy.requires_grad_(False)
     return fmean(losses[-math.ceil(len(losses) / 10) :])
 
 
