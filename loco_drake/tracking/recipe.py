@@ -119,6 +119,13 @@ class Recipe:
             if stage.after is not None:
                 what = f"stage before {stage.name}"
                 check_choice(what, stage.after, names[:index])
+            if stage.recovery is not None:
+                what = f"stage for recovery in {stage.name}"
+                check_choice(what, stage.recovery, names[:index])
+                if stage.guided is None:
+                    raise InputError(
+                        f"The stage {stage.name} has a recovery, but is not guided."
+                    )
             for name in stage.references:
                 check_choice("references", name, self.references)
             try:

@@ -68,6 +68,9 @@ class Stage:
     # Options of `train guided`, which the stage is then instead of `train tracker`;
     # null if it is not.
     guided: dict[str, Any] | None = None
+    # Of a guided stage: the stage whose network acts far from the plan in it and in
+    # those that follow it.
+    recovery: str | None = None
 
 
 @dataclass(kw_only=True)

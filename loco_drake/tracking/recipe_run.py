@@ -233,15 +233,19 @@ class _Run:
         if self.recipe.recovery is None:
             halve_policy(last / POLICY, target)
             return
-        names = [stage.name for stage in self.recipe.stages]
-        far = self.stage_folder(names.index(self.recipe.recovery))
-        both = self.folder / _BOTH
-        join_policies(last / POLICY, far / POLICY, both)
+        both = self._join(last / POLICY, self.recipe.recovery)
         halve_policy(both, target)
         both.unlink()
         if self.evaluator:
             done = self._steps_before(len(self.recipe.stages))
             self.evaluator.evaluate(done, None, target)
+
+    def _join(self, near: Path, stage: str) -> Path:
+        """Writes the policy ``near`` and that of a stage, far from the plan, as one."""
+        names = [one.name for one in self.recipe.stages]
+        far = self.stage_folder(names.index(stage)) / POLICY
+        join_policies(near, far, self.folder / _BOTH)
+        return self.folder / _BOTH
 
     def _train_stage(self, index: int, stage: Stage, plans: list[Plan]) -> bool:
         folder, first = self.stage_folder(index), None
@@ -289,8 +293,10 @@ class _Run:
             return train_tracker(
                 plans, config, folder, resume=resume, first=first, report=report
             )
-        if first is not None and first.name == CHECKPOINT:
+        if first is not None:
             first = first.with_name(POLICY)
+            if stage.recovery is not None:
+                first = self._join(first, stage.recovery)
         guided = self.recipe.guided(index, self.workers)
         figures = train_guided(
             plans,
@@ -301,6 +307,7 @@ class _Run:
             report=report,
             executor=Local(self.workers),
         )
+        (self.folder / _BOTH).unlink(missing_ok=True)
         # What it costs, as other stages have it.
         return {**figures, "rounds": figures["steps"], "steps": figures["periods"]}
 

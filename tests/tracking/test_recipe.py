@@ -101,9 +101,17 @@ def test_a_guided_stage_has_the_options_of_train_guided(recipe):
     assert (found.robot, found.seed, found.workers, found.steps) == ("a1", 6, 3, 3)
     assert (found.stretches, found.stretch.length) == (200, 80)
     assert (found.stretch.tail, found.learning_rate) == (15, 1e-4)
+    recipe.stages[1].recovery = "second"
+    with pytest.raises(InputError, match="recovery in second"):
+        recipe.check()
+    recipe.stages[1].recovery = "first"
+    recipe.check()
     part = scaled(recipe, 0.01).stages[1]
     assert (part.steps, part.guided["stretches"], part.guided["updates"]) == (1, 2, 50)
     assert "updates" not in guided
+    recipe.stages[1].guided = None
+    with pytest.raises(InputError, match="second has a recovery, but is not guided"):
+        recipe.check()
 
 
 @pytest.mark.parametrize(

@@ -99,7 +99,9 @@ def test_a_guided_stage_between_two(recipe, tmp_path):
     """Its networks are those of the policy before, and the next stage begins there."""
     stretch = {"length": 30, "tail": 4, "lead": 0, "ilqr": {"iterations": 1}}
     options = {"stretches": 2, "updates": 20, "minibatch": 32, "stretch": stretch}
-    shown = Stage(name="shown", steps=1, guided=options, references=["plain"])
+    shown = Stage(
+        name="shown", steps=1, guided=options, references=["plain"], recovery="first"
+    )
     stages = [recipe.stages[0], shown, replace(recipe.stages[1], steps=64)]
     figures = run_recipe(tmp_path / "run", replace(recipe, stages=stages))
     folder = tmp_path / "run"
@@ -107,7 +109,8 @@ def test_a_guided_stage_between_two(recipe, tmp_path):
     assert laws
     begun = read_actor(folder / "2-shown" / "start.safetensors")[0].state_dict()
     first = read_actor(folder / "1-first" / POLICY)[0].state_dict()
-    assert all((begun[name] == first[name]).all() for name in begun)
+    assert all((begun[name] == first[name]).all() for name in first)
+    assert not (folder / "both.safetensors").exists()
     periods = read_json(folder / "2-shown" / "figures.json")["steps"]
     assert periods == sum(load_found(path).periods for path in laws)
     assert figures["steps"] == 192 + periods + 64
@@ -117,6 +120,14 @@ def test_a_guided_stage_between_two(recipe, tmp_path):
     )
     assert 0 < (last - shown).abs().max() < 0.02
     assert (shown - read_actor(folder / "1-first" / POLICY)[0].layers[0].weight).any()
+    # What acts far from the plan is what the guided stage ended with.
+    far, whole = (
+        recovery_of(read_actor(folder / name)[0])
+        for name in (f"2-shown/{POLICY}", POLICY)
+    )
+    noise = 0.5 * torch.randn(5, OBSERVATION_SIZE)
+    seen = far.mean + noise * far.variance.sqrt()
+    torch.testing.assert_close(far(seen), whole(seen), rtol=1e-2, atol=1e-2)
     again = run_recipe(folder, resume=True)
     assert again["steps"] == figures["steps"]
 
