@@ -8,7 +8,7 @@ from loco_drake.control.domain import Domain, draw_error, measure
 from loco_drake.control.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.reward import reward_terms
-from loco_drake.control.state import POSITION, VELOCITY, has_fallen, split, unit_base
+from loco_drake.control.state import POSITION, has_fallen, split, unit_base
 from loco_drake.models.robots import get_simulated
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.physics import OwnWorld, SharedWorld
@@ -92,11 +92,6 @@ class TrackingBatch:
             self._state[i] = domain.terrain.placed(self._robot, self._state[i])
         self._domains[i] = domain
         self._worlds[i].begin(domain, sample)
-
-    def push(self, i: int, velocity: Array) -> None:
-        """Changes the velocity of robot ``i``'s base at once, by (x, y) in m/s."""
-        _, v = split(self._state[i])
-        v[VELOCITY][:2] += velocity
 
     def step(
         self, actions: NDArray[np.floating]

@@ -79,18 +79,13 @@ def find_law(
     random = np.random.default_rng(seed)
     number = int(random.integers(len(plans)))
     lead = int(random.integers(config.lead + 1) * (random.random() < config.lead_share))
-    push = config.push * random.random() * (random.random() < config.push_share)
-    angle = 2 * np.pi * random.random()
     length = len(plans[number])
     first = int(random.integers(max(1, length - config.length - lead - 2)))
     batch = TrackingBatch([plans[number]], environment, 1)
     batch.reset(0, random, 0, first)
     problem = TrackingProblem(plans[number], environment)
     states, actions = [batch.states[0]], [np.zeros(problem.joints)]
-    for k in range(min(lead + config.length, length - first - 2)):
-        if k == lead:
-            batch.push(0, push * np.array([np.cos(angle), np.sin(angle)]))
-            states[lead] = batch.states[0]
+    for _ in range(min(lead + config.length, length - first - 2)):
         with torch.inference_mode(), single_thread():
             action = actor(torch.from_numpy(batch.observe())).numpy()
         _, lost, _ = batch.step(action)

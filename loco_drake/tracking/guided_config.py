@@ -42,10 +42,6 @@ class StretchConfig:
     lead: int = 30
     # Share of the stretches that have a lead; the others start beside the plan.
     lead_share: float = 0.25
-    # Share of the stretches that begin with a push: a change of the base's velocity.
-    push_share: float = 0.3
-    # The largest push, m/s; they are uniform from none to it, in all directions.
-    push: float = 1.2
     # Iterative LQR: one linearization, since the policy comes back with another motion.
     ilqr: IlqrConfig = field(default_factory=lambda: IlqrConfig(iterations=1))
 
@@ -55,8 +51,6 @@ class StretchConfig:
         check_at_least("stretch.tail", self.tail, 0)
         check_at_least("stretch.lead", self.lead, 0)
         check_bounds("--stretch.lead-share", self.lead_share, 0, 1)
-        check_bounds("--stretch.push-share", self.push_share, 0, 1)
-        check_bounds("--stretch.push", self.push, 0)
         for name in ("iterations", "steps"):
             check_at_least(f"stretch.ilqr.{name}", getattr(self.ilqr, name), 1)
         for name in ("effort", "change", "gain_cost"):

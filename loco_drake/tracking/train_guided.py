@@ -50,12 +50,12 @@ def train_guided(
     report: Report = lambda steps, scores: None,
     executor: Executor = LOCAL,
 ) -> dict[str, Any]:
-    """Improves a policy: its network, or both if one acts far from the plan.
+    """Improves a policy: its network, or of two the one that acts near the plan.
 
-    After each round it writes the files of
-    :func:`.train.train_tracker` but for TensorBoard's to ``folder``; laws are written
-    there one by one, so an interruption, or being killed, loses seconds of finding laws
-    or minutes of learning.
+    Laws are found where the whole policy gets to. After each round it writes the files
+    of :func:`.train.train_tracker` but for TensorBoard's to ``folder``; laws are
+    written there one by one, so an interruption, or being killed, loses seconds of
+    finding laws or minutes of learning.
 
     Args:
         plans: what to follow.
@@ -82,6 +82,7 @@ def train_guided(
     robot = get_simulated(config.environment.robot)
     path = first or Path(folder) / _START
     policy, learner = read_actor(path)
+    policy.requires_grad_(False)
     if policy.config.robot != robot.name or policy.config.history is not None:
         raise InputError(
             f"The policy in {path} must be one of {robot.name} without a memory."
@@ -193,8 +194,9 @@ def _find(
 def _learn(policy: Actor, laws: Laws, config: GuidedConfig, number: int) -> float:
     """Learns the laws; returns the mean loss of the last tenth of the updates."""
     random = np.random.default_rng((config.seed, number))
-    policy.requires_grad_(True)
-    optimizer = torch.optim.Adam(policy.parameters(), lr=config.learning_rate)
+    # What acts far from the plan has learned more worlds than the model's.
+    policy.layers.requires_grad_(True)
+    optimizer = torch.optim.Adam(policy.layers.parameters(), lr=config.learning_rate)
     losses = []
     for update in range(config.updates):
         for group in optimizer.param_groups:
@@ -206,7 +208,7 @@ def _learn(policy: Actor, laws: Laws, config: GuidedConfig, number: int) -> floa
         loss.backward()  # type: ignore[no-untyped-call]
         optimizer.step()
         losses.append(loss.item())
-    policy.requires_grad_(False)
+    policy.layers.requires_grad_(False)
     return fmean(losses[-math.ceil(len(losses) / 10) :])
 
 
