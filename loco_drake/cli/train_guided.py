@@ -42,7 +42,8 @@ class TrainGuided(GuidedConfig, EngineOptions):
     def run(self) -> int:
         """Trains, prints and writes; returns the exit status."""
         from loco_drake.common.run_folder import check_folder, options_of
-        from loco_drake.models.shipped import training_path
+        from loco_drake.models.robots import get_simulated
+        from loco_drake.models.shipped import policy_path, training_path
         from loco_drake.tracking.train import POLICY
         from loco_drake.tracking.train_guided import train_guided
 
@@ -50,8 +51,11 @@ class TrainGuided(GuidedConfig, EngineOptions):
         self.check()
         check_folder(self.out, POLICY, self.resume)
         executor = self.executor_of(self.workers)
-        start = self.start_from or Path(self.environment.robot)
-        first = None if self.resume else training_path(start)
+        first = None
+        if self.start_from is not None:
+            first = training_path(self.start_from)
+        elif not self.resume:
+            first = policy_path(get_simulated(self.robot), None)
         return train_policy(
             self,
             lambda plans, report: train_guided(

@@ -126,7 +126,8 @@ def train_policy(command: Any, train: TrainPolicy) -> int:
         lambda: write_results(command.json, figures),
     )
     if figures["interrupted"]:
-        return print_stopped(figures["steps"], command.steps)
+        saved = figures.get("saved", figures["steps"] > 0)
+        return print_stopped(figures["steps"], command.steps, saved=saved)
     return 0
 
 
@@ -156,8 +157,8 @@ def parse_resumed(command: Any, name: str, args: Sequence[str]) -> Any:
     return parsed
 
 
-def print_stopped(done: int, steps: int) -> int:
+def print_stopped(done: int, steps: int, *, saved: bool = True) -> int:
     """Prints how to resume on stderr; returns the exit status of unfinished work."""
-    how = "the same command with --resume goes on" if done else "nothing is saved yet"
+    how = "the same command with --resume goes on" if saved else "nothing is saved yet"
     say(f"Stopped after {done} of {steps} steps; {how}.")
     return 1

@@ -107,6 +107,7 @@ class GuidedConfig:
         """Raises InputError unless a training can begin."""
         for name in ("stretches", "workers", "updates", "minibatch", "capacity"):
             check_at_least(name, getattr(self, name), 1)
+        check_at_least("seed", self.seed, 0)
         check_bounds("--learning-rate", self.learning_rate, 0, 1, above=True)
         self.stretch.check()
         self.environment.check()

@@ -12,14 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from loco_drake.common.arrays import Array
-from loco_drake.control.state import HEIGHT
 from loco_drake.control.state_change import change_between
 from loco_drake.tracking.guided_config import IlqrConfig
 from loco_drake.tracking.problem import TrackingProblem
 
 _LARGEST_CHANGE = 1.5  # of an action, from one iteration to the next
 _SHARES = (1.0, 0.5, 0.2, 0.07)  # of a step that are tried
-_LOWEST = 0.1  # m; a base that is lower has fallen
 # Damping of a step, which rises while steps fail, and falls.
 _DAMPING, _LEAST_DAMPING, _RISE = 0.05, 0.01, 4.0
 # First with a linearization, and further on.
@@ -138,7 +136,7 @@ class Ilqr:
             change = np.clip(change, -_LARGEST_CHANGE, _LARGEST_CHANGE)
             action = law.actions[t] + change
             state = self._problem.next_state(first + t + 1, state, action)
-            if not np.isfinite(state).all() or state[HEIGHT] < _LOWEST:
+            if not np.isfinite(state).all() or self._problem.is_fallen(state):
                 return None
             states.append(state)
             actions.append(action)

@@ -153,7 +153,8 @@ class Laws:
 def law_loss(actions: Tensor, told: Tensor, weights: Tensor) -> Tensor:
     """Returns how far actions (N, J) are from those that laws tell: a number.
 
-    It is the mean of the squares e' W e, and far from them of the distance.
+    With s = e' W e / J of each sample it is the mean of 2 (sqrt(1 + s) - 1): quadratic
+    in small errors e, linear in large ones.
     """
     wrong = actions - told
     square = torch.einsum("ni,nij,nj->n", wrong, weights, wrong) / wrong.shape[-1]

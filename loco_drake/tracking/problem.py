@@ -6,15 +6,15 @@ from loco_drake.common.arrays import Array
 from loco_drake.control.action import joint_targets, set_points
 from loco_drake.control.plan import Plan
 from loco_drake.control.reward import REWARD_WEIGHTS, reward_residuals
-from loco_drake.control.state import unit_base
+from loco_drake.control.state import has_fallen, split, unit_base
 from loco_drake.control.state_change import change_between, changed
 from loco_drake.models.robots import get_simulated
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.physics import SharedWorld
 
-# Half a difference in each of a change's parts: base rotation, base translation,
-# joints and their velocities, rad, m, s; and of an action. A contact is as stiff as
-# 1 mm in some tens of newtons, and differences across several millimetres average it.
+# Half a difference in each of a change's parts: base rotation and translation, joints,
+# angular velocity and velocity of the base, and joint velocities; rad, m, s. A contact
+# yields 1 mm to some tens of newtons; differences across some millimetres average it.
 _STEPS = (0.012, 0.006, 0.012, 0.12, 0.06, 0.3)
 _ACTION_STEP = 0.18
 _COST_STEP = 1e-5
@@ -45,6 +45,10 @@ class TrackingProblem:
         desired = joint_targets(self._set_points[sample], action)
         after: Array = unit_base(self._world.advance(state, desired)[None])[0]
         return after
+
+    def is_fallen(self, state: Array) -> bool:
+        """Says whether the robot has fallen, see :func:`has_fallen`."""
+        return bool(has_fallen(self._robot, split(state)[0]))
 
     def linearize(
         self, sample: int, state: Array, action: Array

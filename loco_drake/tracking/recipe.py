@@ -34,6 +34,7 @@ from loco_drake.tracking.recipe_parts import (
 
 Config = TypeVar("Config", TrainingConfig, GuidedConfig)
 
+_WORLD = ("plant", "termination", "reset_noise")  # of a guided stage, from common
 _SHIPPED = Path(__file__).parent / "recipes"
 
 
@@ -111,6 +112,7 @@ class Recipe:
             raise InputError("The first stage has no policy that it could guide.")
         if self.recovery is not None:
             check_choice("stage for recovery", self.recovery, names[:-1])
+            self._check_joined(len(names) - 1, self.recovery)
         for index, stage in enumerate(self.stages):
             _check_folder_name("name of a stage", stage.name)
             if names.count(stage.name) > 1:
@@ -126,6 +128,9 @@ class Recipe:
                     raise InputError(
                         f"The stage {stage.name} has a recovery, but is not guided."
                     )
+                before = self.before_stage(index)
+                assert before is not None
+                self._check_joined(before, stage.recovery)
             for name in stage.references:
                 check_choice("references", name, self.references)
             try:
@@ -134,6 +139,16 @@ class Recipe:
                     self.guided(index).check()
             except InputError as error:
                 raise InputError(f"Stage {quoted(stage.name)}: {error}") from None
+
+    def _check_joined(self, near: int, far: str) -> None:
+        """Raises InputError if one of two stages to join has two networks already."""
+        names = [stage.name for stage in self.stages]
+        for name in (names[near], far):
+            index: int | None = names.index(name)
+            while index is not None:
+                if self.stages[index].recovery is not None:
+                    raise InputError(f"The stage {name} has a recovery already.")
+                index = self.before_stage(index)
 
     def before_stage(self, index: int) -> int | None:
         """Returns the stage whose networks a stage begins with, None for the first."""
@@ -186,7 +201,12 @@ class Recipe:
         for name in ("robot", *own):
             if name in options:
                 raise InputError(f"{name} is no option of a stage's guided search.")
-        return _converted({**options, **own, "robot": self.robot}, GuidedConfig)
+        if stage.environment or stage.ppo:
+            raise InputError("a guided stage has no environment and no ppo.")
+        # Laws are found in the world of the other stages.
+        world = {k: v for k, v in self.common.environment.items() if k in _WORLD}
+        values = {**_overlaid(world, options), **own, "robot": self.robot}
+        return _converted(values, GuidedConfig)
 
 
 def read_recipe(name: Path, robot: str | None = None) -> Recipe:

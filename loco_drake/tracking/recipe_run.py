@@ -167,8 +167,9 @@ class _Run:
         if figures["interrupted"]:
             return False
         last = stage_folder(folder, first, len(first.stages) - 1)
+        ended = CHECKPOINT if first.stages[-1].guided is None else POLICY
         with atomic_path(start) as temporary:
-            shutil.copyfile(last / CHECKPOINT, temporary)
+            shutil.copyfile(last / ended, temporary)
         return True
 
     def make_body(self) -> bool:
@@ -265,6 +266,8 @@ class _Run:
             self.report(f"{index + 1} {stage.name}", steps, stage.steps, note)
             if self.stop.is_set():  # before the training listened itself
                 signal.raise_signal(signal.SIGINT)
+            if stage.guided is not None:
+                return  # steps are rounds
             if self.evaluator and self.evaluator.is_due(before + steps):
                 self.evaluator.evaluate(before + steps, index, folder / POLICY)
 
@@ -323,4 +326,7 @@ def _of_stage(recipe: Recipe, index: int) -> tuple[Any, ...]:
     """Returns what a stage depends on, for comparison."""
     stage = recipe.stages[index]
     before = recipe.before_stage(index)
-    return stage.name, before, recipe.references_of(stage), recipe.training(index)
+    own = (stage.name, before, recipe.references_of(stage))
+    if stage.guided is not None:
+        return *own, recipe.guided(index), stage.recovery
+    return *own, recipe.training(index)

@@ -21,14 +21,14 @@ from loco_drake.common.errors import InputError
 from loco_drake.common.files import atomic_path
 from loco_drake.common.weights import load_into
 from loco_drake.control.actor import Actor
-from loco_drake.control.actor_file import read_actor, save_actor
-from loco_drake.control.plan import Plan
+from loco_drake.control.actor_file import load_actor, read_actor, save_actor
+from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.engine.executor import Executor
 from loco_drake.engine.local import LOCAL
 from loco_drake.models.robots import get_simulated
 from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.tracking.guidance import Found, find_laws
-from loco_drake.tracking.guided_config import GuidedConfig
+from loco_drake.tracking.guided_config import FEWEST, GuidedConfig
 from loco_drake.tracking.laws import Laws, law_loss, load_found, save_found
 from loco_drake.tracking.learning_curve import PROGRESS
 from loco_drake.tracking.train import POLICY, Report
@@ -81,11 +81,14 @@ def train_guided(
     config.check()
     robot = get_simulated(config.environment.robot)
     path = first or Path(folder) / _START
-    policy, learner = read_actor(path)
+    policy, learner = load_actor(path, robot), read_actor(path)[1]
     policy.requires_grad_(False)
-    if policy.config.robot != robot.name or policy.config.history is not None:
+    if policy.config.history is not None:
+        raise InputError(f"The policy in {path} has a memory, and learns no laws.")
+    shortest = FEWEST + config.stretch.tail + 2
+    if max(map(len, plans)) < shortest:
         raise InputError(
-            f"The policy in {path} must be one of {robot.name} without a memory."
+            f"No motion has the {shortest} samples of {PLAN_DT:g} s that a law takes."
         )
     own = run_folder.options_of(config)
     own = {field.name: own[field.name] for field in fields(GuidedConfig)}
@@ -113,14 +116,22 @@ def train_guided(
             rounds = list(held.saved.state["rounds"])
             load_into(policy, run_folder.networks(held.saved), held.path)
         else:
+            shutil.rmtree(Path(folder) / _LAWS, ignore_errors=True)
             with atomic_path(Path(folder) / _START) as temporary:
                 shutil.copyfile(path, temporary)
             held.save(_tensors(policy), {"steps": 0, "rounds": []})
         before: dict[str, float] = {}
         laws = Laws(robot, plans, config.capacity)
-        for past in range(len(rounds)):
-            for file in sorted(_of_round(folder, past).glob("*.safetensors")):
+        for past, line in enumerate(rounds):
+            files = _files(_of_round(folder, past))
+            if len(files) != line["train/laws"]:
+                raise InputError(
+                    f"{_of_round(folder, past)} has {len(files)} laws, not the "
+                    f"{line['train/laws']} of the run: it cannot be resumed."
+                )
+            for file in files:
                 laws.add(load_found(file))
+        seconds_before = rounds[-1]["seconds"] if rounds else 0.0
         while len(rounds) < config.steps and not stop.is_set():
             number = len(rounds)
             save_actor(policy, folder / _ACTING)
@@ -129,8 +140,13 @@ def train_guided(
                 break
             for one in found:
                 laws.add(one)
+            if not len(laws):
+                raise InputError(
+                    "No law was found: the policy loses every stretch at once, or no "
+                    "actions are better; begin with another policy, in another folder."
+                )
             loss = _learn(policy, laws, config, number)
-            seconds = time.monotonic() - start
+            seconds = seconds_before + time.monotonic() - start
             periods = rounds[-1]["steps"] if rounds else 0
             periods += sum(one.periods for one in found)
             line = {"round": number + 1, "steps": periods, "seconds": seconds}
@@ -140,17 +156,20 @@ def train_guided(
             line |= {f"return/{label}": x for label, x in before.items()}
             line |= {f"improved/{label}": x for label, x in after.items()}
             rounds.append(line)
-            held.save(_tensors(policy), {"steps": len(rounds), "rounds": rounds})
+            # The checkpoint last: what it says is done is there.
             save_actor(policy, folder / POLICY, learner=learner)
-            with (folder / PROGRESS).open("w") as log:
-                log.writelines(json.dumps(one) + "\n" for one in rounds)
-            report(len(rounds), before)
+            with atomic_path(folder / PROGRESS) as temporary:
+                temporary.write_text("".join(json.dumps(x) + "\n" for x in rounds))
+            held.save(_tensors(policy), {"steps": len(rounds), "rounds": rounds})
+            if before:
+                report(len(rounds), before)
     return {
         "robot": robot.name,
         "steps": len(rounds),
         "periods": rounds[-1]["steps"] if rounds else 0,
         "wall_clock_s": time.monotonic() - start,
         "interrupted": len(rounds) < config.steps,
+        "saved": True,
         "scores": before,
         "rounds": rounds,
     }
@@ -158,6 +177,11 @@ def train_guided(
 
 def _of_round(folder: Path, number: int) -> Path:
     return Path(folder) / _LAWS / f"{number + 1:03d}"
+
+
+def _files(folder: Path) -> list[Path]:
+    """Returns the files of a round's laws; not what is half-written."""
+    return sorted(folder.glob("[0-9]*.safetensors"))
 
 
 def _tensors(policy: Actor) -> dict[str, torch.Tensor]:
@@ -175,6 +199,8 @@ def _find(
     """Finds the laws of a round that are not found yet; None if it is stopped."""
     into = _of_round(folder, number)
     into.mkdir(parents=True, exist_ok=True)
+    for unfinished in into.glob(".*"):
+        unfinished.unlink()  # left by a training that was killed
     paths = [into / f"{i:05d}.safetensors" for i in range(config.stretches)]
     missing = [i for i, path in enumerate(paths) if not path.is_file()]
     seeds = [(config.seed, number, i) for i in missing]
@@ -188,7 +214,7 @@ def _find(
         if stop.is_set():
             return None
     # As they are stored, whether or not the training was interrupted.
-    return [load_found(path) for path in paths if path.is_file()]
+    return [load_found(path) for path in _files(into)]
 
 
 def _learn(policy: Actor, laws: Laws, config: GuidedConfig, number: int) -> float:

@@ -1,6 +1,7 @@
 """Guided policy search: laws along what a policy does, and learning them."""
 
 import json
+import shutil
 import signal
 from dataclasses import replace
 
@@ -9,7 +10,7 @@ import pytest
 import torch
 
 from loco_drake.common.errors import InputError
-from loco_drake.control.actor_file import load_actor, read_actor
+from loco_drake.control.actor_file import load_actor, read_actor, save_actor
 from loco_drake.control.observation import observe, preview
 from loco_drake.control.plan import PLAN_DT
 from loco_drake.engine.local import Local
@@ -187,12 +188,38 @@ def test_interruptions_change_nothing(trained, plans, tmp_path):
     assert all((one[name] == other[name]).all() for name in one)
 
 
+def test_a_policy_that_finds_no_law_is_refused(plans, tmp_path):
+    wild, path = load_actor(START, get_robot("go2")), tmp_path / "wild.safetensors"
+    with torch.no_grad():
+        wild.layers[-1].bias += 20.0
+        wild.recovery[-1].bias += 20.0
+    save_actor(wild, path)
+    with pytest.raises(InputError, match="No law was found"):
+        train_guided(plans, path, config(1), tmp_path / "run")
+
+
+def test_laws_that_are_gone_or_half_written(trained, plans, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(trained[0], folder)
+    laws = folder / "laws" / "002"
+    (laws / ".00007.safetensors").write_bytes(b"half")  # by a kill
+    train_guided(plans, None, config(2), folder, resume=True)
+    next(laws.glob("0*")).unlink()
+    with pytest.raises(InputError, match="has 1 laws, not the 2 of the run"):
+        train_guided(plans, None, config(2), folder, resume=True)
+
+
 def test_what_cannot_be_trained(plans, tmp_path):
     student = pretrained_path("policy_go2_unprivileged")
-    with pytest.raises(InputError, match="one of go2 without a memory"):
+    with pytest.raises(InputError, match="has a memory, and learns no laws"):
         train_guided(plans, student, config(1), tmp_path / "a")
-    with pytest.raises(InputError, match="one of go2 without a memory"):
+    with pytest.raises(InputError, match="another robot: a1, not go2"):
         train_guided(plans, pretrained_path("policy_a1"), config(1), tmp_path / "a")
+    longer = config(1, stretch=replace(SHORT, length=200, tail=140))
+    with pytest.raises(InputError, match=r"No motion has the 167 samples of 0\.02 s"):
+        train_guided(plans, START, longer, tmp_path / "a")
+    with pytest.raises(InputError, match="--seed must be 0 or more"):
+        train_guided(plans, START, config(1, seed=-1), tmp_path / "a")
     with pytest.raises(InputError, match="length must be 29 or more"):
         train_guided(
             plans, START, config(1, stretch=replace(SHORT, length=20)), tmp_path / "a"

@@ -45,6 +45,9 @@ class Linear:
         change = self.A @ change_between(self.still, state) + self.B @ action
         return changed(self.still, change)
 
+    def is_fallen(self, state):
+        return False
+
     def linearize(self, sample, state, action):
         return self.A, self.B
 

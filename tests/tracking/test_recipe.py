@@ -96,6 +96,7 @@ def test_shipped_recipes_need_no_more_steps_than_their_budget(robot):
 def test_a_guided_stage_has_the_options_of_train_guided(recipe):
     guided = {"stretches": 200, "stretch": {"length": 80}, "learning_rate": "1e-4"}
     recipe.stages[1].guided, recipe.stages[1].steps = guided, 3
+    recipe.stages[1].environment = {}
     recipe.check()
     found = recipe.guided(1, workers=3)
     assert (found.robot, found.seed, found.workers, found.steps) == ("a1", 6, 3, 3)
@@ -114,17 +115,37 @@ def test_a_guided_stage_has_the_options_of_train_guided(recipe):
         recipe.check()
 
 
+def test_guided_stages_and_the_rest_of_the_recipe(recipe):
+    recipe.common.environment["plant"] = {"friction": 0.6}
+    guided = Stage(name="shown", steps=2, guided={}, recovery="second")
+    recipe.stages.append(guided)
+    recipe.check()
+    found = recipe.guided(2)
+    assert (found.plant.friction, found.termination.position) == (0.6, 1.5)
+    recipe.recovery = "first"
+    with pytest.raises(InputError, match="The stage shown has a recovery already"):
+        recipe.check()
+    recipe.recovery = None
+    recipe.stages.append(replace(guided, name="again"))
+    with pytest.raises(InputError, match="The stage shown has a recovery already"):
+        recipe.check()
+    recipe.stages[3] = Stage(name="after", steps=2, guided={}, ppo={"batch": 64})
+    with pytest.raises(InputError, match="a guided stage has no environment and no"):
+        recipe.check()
+
+
 @pytest.mark.parametrize(
     ("stage", "guided", "said"),
     [
         (0, {}, "The first stage has no policy that it could guide"),
         (1, {"batch": 64}, "Stage 'second': it has the unknown field 'batch'"),
         (1, {"robot": "go2"}, "robot is no option of a stage's guided search"),
+        (1, {"seed": 1}, "seed is no option of a stage's guided search"),
         (1, {"stretch": {"length": 10}}, "length must be 40 or more, not 10"),
     ],
 )
 def test_guided_stages_that_are_wrong(recipe, stage, guided, said):
-    recipe.stages[stage].guided = guided
+    recipe.stages[stage].guided, recipe.stages[stage].environment = guided, {}
     with pytest.raises(InputError, match=said):
         recipe.check()
 
