@@ -28,7 +28,7 @@ def test_help_waits_for_no_slow_library(name, tmp_path):
     printed = run_python("-c", HELP, *name.split(), cwd=tmp_path)
     assert f"loco-drake {name}" in printed
     # Bounds of its worlds come from a robot's model, which takes .2 s.
-    worlds = ("evaluate tracking", "train tracker", "train student")
+    worlds = ("evaluate tracking", "train tracker", "train guided", "train student")
     drake = " pydrake" if name in worlds else ""
     assert printed.splitlines()[-1] == f"imported:{drake}"
 
