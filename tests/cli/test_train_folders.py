@@ -181,12 +181,13 @@ def test_a_full_disk_ends_training_in_one_sentence(kind, run_of):
     """What cannot be written replaces nothing, and leaves nothing behind."""
     out = run_of(kind)
     before = (out / CHECKPOINT).read_bytes()
+    steps = {"tokenizer": 16, "tracker": 256}[kind]
     script = (
         "import resource; from loco_drake.cli.main import main\n"
         "if __name__ == '__main__':\n"
         f"    resource.setrlimit(resource.RLIMIT_FSIZE, ({len(before) // 2},) * 2)\n"
         f"    raise SystemExit(main(['train', '{kind}', '--resume', '--out', "
-        f"'{out}', '--steps', '256']))"
+        f"'{out}', '--steps', '{steps}']))"
     )
     (out / "main.py").write_text(script)
     ended = subprocess.run(

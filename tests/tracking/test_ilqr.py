@@ -111,11 +111,11 @@ def test_gradient_of_the_cost(problem, trot):
 
 def test_law_improves_a_trot_and_returns_to_it(problem, trot):
     """From no actions, and from a start that is turned, shifted and slower."""
-    first, T = 10, 60
+    first, T = 10, 50
     start = trot.state[first]
     actions = np.zeros((T, 12))
     states = rollout(problem, start, actions, first)
-    config = IlqrConfig(iterations=2)
+    config = IlqrConfig(iterations=1)
     law = Ilqr(problem, config).improve(first, states, actions, np.zeros(12))
     lost = 1 - problem.rewards(first + 1, states[1:]).mean()
     assert 1 - law.reward < 0.6 * lost
