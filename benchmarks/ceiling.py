@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 import tyro
 
 from loco_drake.common.arrays import Array
@@ -24,6 +23,7 @@ from loco_drake.models.shipped import policy_path
 from loco_drake.motion.gaits import LABELS
 from loco_drake.tracking.batch import TrackingBatch
 from loco_drake.tracking.config import EnvironmentConfig, ResetNoise
+from loco_drake.tracking.guidance import track
 from loco_drake.tracking.guided_config import IlqrConfig
 from loco_drake.tracking.ilqr import Ilqr
 from loco_drake.tracking.problem import TrackingProblem
@@ -69,15 +69,8 @@ def main(
         (plan,) = generate_references(model, [label], count=1, seconds=10.0, seed=seed)
         batch = TrackingBatch([plan], config, 1)
         batch.reset(0, np.random.default_rng(0), 0, 0)
-        states, actions = [batch.states[0]], []
-        for _ in range(steps):
-            with torch.inference_mode():
-                action = actor(torch.from_numpy(batch.observe())).numpy()
-            batch.step(action)
-            states.append(batch.states[0])
-            actions.append(action[0].astype(np.float64))
+        visited, taken = track(batch, actor, steps)
         problem = TrackingProblem(plan, config)
-        visited, taken = np.array(states), np.array(actions)
         law = Ilqr(problem, IlqrConfig(iterations=iterations, change=change)).improve(
             0, visited, taken, np.zeros(taken.shape[1])
         )

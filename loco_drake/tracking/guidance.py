@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.determinism import single_thread
 from loco_drake.control.actor import Actor
 from loco_drake.control.actor_file import load_actor
@@ -84,24 +85,35 @@ def find_law(
     batch = TrackingBatch([plans[number]], environment, 1)
     batch.reset(0, random, 0, first)
     problem = TrackingProblem(plans[number], environment)
-    states, actions = [batch.states[0]], [np.zeros(problem.joints)]
-    for _ in range(min(lead + config.length, length - first - 2)):
-        with torch.inference_mode(), single_thread():
-            action = actor(torch.from_numpy(batch.observe())).numpy()
-        _, lost, _ = batch.step(action)
-        if lost[0]:
-            del states[-_BEFORE_LOSS:], actions[-_BEFORE_LOSS:]
-            break
-        states.append(batch.states[0])
-        actions.append(action[0].astype(np.float64))
+    states, taken = track(batch, actor, min(lead + config.length, length - first - 2))
+    if batch.sample[0] - first > len(taken):  # it is lost in the last period
+        states, taken = states[:-_BEFORE_LOSS], taken[:-_BEFORE_LOSS]
     kept = len(states) - 1 - lead - config.tail
     if kept < FEWEST:
         return None
-    start = first + lead
-    visited, taken = np.array(states[lead:]), np.array(actions[lead + 1 :])
-    law = Ilqr(problem, config.ilqr).improve(start, visited, taken, actions[lead])
+    previous = taken[lead - 1] if lead else np.zeros(problem.joints)
+    start, visited, taken = first + lead, states[lead:], taken[lead:]
+    law = Ilqr(problem, config.ilqr).improve(start, visited, taken, previous)
     if law is None:
         return None
     before = float(problem.rewards(start + 1, visited[1:]).mean())
     periods = problem.periods + lead + len(taken)
     return Found(number, start, law.cut(kept), before, periods)
+
+
+def track(batch: TrackingBatch, actor: Actor, steps: int) -> tuple[Array, Array]:
+    """Lets a policy track the plan of a batch's only robot, until it loses it.
+
+    Returns the states (T + 1, 13 + 2 J) and the actions (T, J), at most ``steps``.
+    """
+    states, actions = [batch.states[0]], []
+    for _ in range(steps):
+        with torch.inference_mode(), single_thread():
+            action = actor(torch.from_numpy(batch.observe())).numpy()
+        _, lost, _ = batch.step(action)
+        if lost[0]:
+            break
+        states.append(batch.states[0])
+        actions.append(action[0].astype(np.float64))
+    joints = len(batch.states[0]) // 2 - 6
+    return np.array(states), np.array(actions).reshape(-1, joints)

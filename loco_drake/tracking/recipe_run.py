@@ -253,8 +253,12 @@ class _Run:
         resume = (folder / CHECKPOINT).is_file()
         earlier = self.recipe.before_stage(index)
         if not resume and earlier is not None:
-            guided = self.recipe.stages[earlier].guided is not None
-            first = self.stage_folder(earlier) / (POLICY if guided else CHECKPOINT)
+            both = (stage, self.recipe.stages[earlier])
+            by_ppo = all(one.guided is None for one in both)
+            # Between trainings by PPO the checkpoint: it has all that its policy has.
+            first = self.stage_folder(earlier) / (CHECKPOINT if by_ppo else POLICY)
+            if stage.recovery is not None:
+                first = self._join(first, stage.recovery)
         elif not resume and (self.folder / START).is_file():
             first = self.folder / START
 
@@ -296,10 +300,6 @@ class _Run:
             return train_tracker(
                 plans, config, folder, resume=resume, first=first, report=report
             )
-        if first is not None:
-            first = first.with_name(POLICY)
-            if stage.recovery is not None:
-                first = self._join(first, stage.recovery)
         guided = self.recipe.guided(index, self.workers)
         figures = train_guided(
             plans,
