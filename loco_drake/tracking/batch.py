@@ -8,7 +8,7 @@ from loco_drake.control.domain import Domain, draw_error, measure
 from loco_drake.control.observation import LOOK_AHEAD, Preview, observe
 from loco_drake.control.plan import PLAN_DT, Plan
 from loco_drake.control.reward import reward_terms
-from loco_drake.control.state import POSITION, has_fallen, split, unit_base
+from loco_drake.control.state import POSITION, VELOCITY, has_fallen, split, unit_base
 from loco_drake.models.robots import get_simulated
 from loco_drake.tracking.config import EnvironmentConfig
 from loco_drake.tracking.physics import OwnWorld, SharedWorld
@@ -92,6 +92,17 @@ class TrackingBatch:
             self._state[i] = domain.terrain.placed(self._robot, self._state[i])
         self._domains[i] = domain
         self._worlds[i].begin(domain, sample)
+
+    def place(self, i: int, sample: int, state: Array, action: Array) -> None:
+        """Puts robot ``i`` at a sample of its plan, in a state, after an action.
+
+        Its world must be the model's, which has no memory.
+        """
+        self.sample[i], self._state[i], self._action[i] = sample, state, action
+
+    def push(self, i: int, v_W: Array) -> None:
+        """Adds ``v_W``, m/s, to the velocity of robot ``i``'s base."""
+        split(self._state[i])[1][VELOCITY] += v_W
 
     def step(
         self, actions: NDArray[np.floating]

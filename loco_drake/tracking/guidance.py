@@ -29,6 +29,7 @@ from loco_drake.tracking.problem import TrackingProblem
 
 # A policy that loses its plan still finds a law on what it did until shortly before.
 _BEFORE_LOSS = 3  # samples
+_FEWEST_LOST = 10  # samples that a policy tracks before it loses its plan
 
 
 @dataclass(frozen=True)
@@ -74,8 +75,10 @@ def find_law(
 ) -> Found | None:
     """Returns a law on a random stretch of a random plan; None if none is found.
 
-    The robot starts beside the plan, by the noise of the environment's starts. There is
-    no law where the policy loses the plan at once, or where no actions cost less.
+    The robot starts beside the plan, by the noise of the environment's starts, and may
+    be pushed. Where the policy loses the plan, what it did is improved and it goes on
+    from there. There is no law where it loses the plan at once, or where no actions
+    cost less.
     """
     random = np.random.default_rng(seed)
     number = int(random.integers(len(plans)))
@@ -85,20 +88,39 @@ def find_law(
     batch = TrackingBatch([plans[number]], environment, 1)
     batch.reset(0, random, 0, first)
     problem = TrackingProblem(plans[number], environment)
-    states, taken = track(batch, actor, min(lead + config.length, length - first - 2))
-    if batch.sample[0] - first > len(taken):  # it is lost in the last period
-        states, taken = states[:-_BEFORE_LOSS], taken[:-_BEFORE_LOSS]
-    kept = len(states) - 1 - lead - config.tail
-    if kept < FEWEST:
+    _, taken = track(batch, actor, lead)
+    if len(taken) < lead:
         return None
-    previous = taken[lead - 1] if lead else np.zeros(problem.joints)
-    start, visited, taken = first + lead, states[lead:], taken[lead:]
-    law = Ilqr(problem, config.ilqr).improve(start, visited, taken, previous)
-    if law is None:
+    previous = taken[-1] if lead else np.zeros(problem.joints)
+    if max(config.push):
+        speed, angle = random.uniform(*config.push), random.uniform(-np.pi, np.pi)
+        batch.push(0, speed * np.array([np.cos(angle), np.sin(angle), 0.0]))
+    start = first + lead
+    whole = min(config.length, length - start - 2)
+    visited, taken = track(batch, actor, whole)
+    before = float(problem.rewards(start + 1, visited[1:]).mean()) if len(taken) else 0
+    ilqr = Ilqr(problem, config.ilqr)
+    law: FeedbackLaw | None = None
+    for rescue in range(config.rescues + 1):
+        lost = len(taken) < whole
+        if lost:
+            visited, taken = visited[:-_BEFORE_LOSS], taken[:-_BEFORE_LOSS]
+        if len(taken) < _FEWEST_LOST:
+            return None
+        better = ilqr.improve(start, visited, taken, previous)
+        law = better or law
+        if better is None or not lost or rescue == config.rescues:
+            break
+        # It may stand now where it fell, and the policy goes on.
+        sample = start + len(better)
+        batch.place(0, sample, better.states[-1], better.actions[-1])
+        further, more = track(batch, actor, whole - len(better))
+        visited = np.concatenate((better.states, further[1:]))
+        taken = np.concatenate((better.actions, more))
+    if law is None or len(law) - config.tail < FEWEST:
         return None
-    before = float(problem.rewards(start + 1, visited[1:]).mean())
     periods = problem.periods + lead + len(taken)
-    return Found(number, start, law.cut(kept), before, periods)
+    return Found(number, start, law.cut(len(law) - config.tail), before, periods)
 
 
 def track(batch: TrackingBatch, actor: Actor, steps: int) -> tuple[Array, Array]:

@@ -1,7 +1,7 @@
 """Configuration of guided policy search; also the command's options."""
 
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -42,6 +42,10 @@ class StretchConfig:
     lead: int = 30
     # Share of the stretches that have a lead; the others start beside the plan.
     lead_share: float = 0.25
+    # Speed of a push at the beginning, in any direction, m/s: least and largest.
+    push: tuple[float, float] = (0.0, 0.0)
+    # How often a stretch that the policy loses is improved before the policy goes on.
+    rescues: int = 3
     # Iterative LQR: one linearization, since the policy comes back with another motion.
     ilqr: IlqrConfig = field(default_factory=lambda: IlqrConfig(iterations=1))
 
@@ -50,6 +54,9 @@ class StretchConfig:
         check_at_least("stretch.length", self.length, FEWEST + self.tail)
         check_at_least("stretch.tail", self.tail, 0)
         check_at_least("stretch.lead", self.lead, 0)
+        check_at_least("stretch.rescues", self.rescues, 0)
+        check_bounds("--stretch.push", self.push[0], 0)
+        check_bounds("--stretch.push", self.push[1], self.push[0], 5)
         check_bounds("--stretch.lead-share", self.lead_share, 0, 1)
         for name in ("iterations", "steps"):
             check_at_least(f"stretch.ilqr.{name}", getattr(self.ilqr, name), 1)
@@ -77,6 +84,8 @@ class GuidedConfig:
     minibatch: int = 512
     # Learning rate: the initial one of a round, which decays to 0 as a half cosine.
     learning_rate: float = 7e-4
+    # Network that learns: of two, the one that acts near the plan or far from it.
+    learns: Literal["near", "far"] = "near"
     # Samples that are kept to learn from.
     capacity: int = 120_000
     # Where laws are found.

@@ -85,6 +85,10 @@ def train_guided(
     policy.requires_grad_(False)
     if policy.config.history is not None:
         raise InputError(f"The policy in {path} has a memory, and learns no laws.")
+    if config.learns == "far" and policy.config.recovery is None:
+        raise InputError(
+            f"The policy in {path} has no second network, far from the plan."
+        )
     shortest = FEWEST + config.stretch.tail + 2
     if max(map(len, plans)) < shortest:
         raise InputError(
@@ -220,9 +224,11 @@ def _find(
 def _learn(policy: Actor, laws: Laws, config: GuidedConfig, number: int) -> float:
     """Learns the laws; returns the mean loss of the last tenth of the updates."""
     random = np.random.default_rng((config.seed, number))
-    # What acts far from the plan has learned more worlds than the model's.
-    policy.layers.requires_grad_(True)
-    optimizer = torch.optim.Adam(policy.layers.parameters(), lr=config.learning_rate)
+    # What acts far from the plan has learned more worlds than the model's, and forgets
+    # them where there are few laws.
+    learner = policy.layers if config.learns == "near" else policy.recovery
+    learner.requires_grad_(True)
+    optimizer = torch.optim.Adam(learner.parameters(), lr=config.learning_rate)
     losses = []
     for update in range(config.updates):
         for group in optimizer.param_groups:
@@ -234,7 +240,7 @@ def _learn(policy: Actor, laws: Laws, config: GuidedConfig, number: int) -> floa
         loss.backward()  # type: ignore[no-untyped-call]
         optimizer.step()
         losses.append(loss.item())
-    policy.layers.requires_grad_(False)
+    learner.requires_grad_(False)
     return fmean(losses[-math.ceil(len(losses) / 10) :])
 
 

@@ -13,9 +13,11 @@ from loco_drake.common.errors import InputError
 from loco_drake.control.actor_file import load_actor, read_actor, save_actor
 from loco_drake.control.observation import observe, preview
 from loco_drake.control.plan import PLAN_DT
+from loco_drake.control.state import VELOCITY, split
 from loco_drake.engine.local import Local
 from loco_drake.models.robots import get_robot
 from loco_drake.models.shipped import pretrained_path
+from loco_drake.tracking.config import ResetNoise
 from loco_drake.tracking.guidance import find_law
 from loco_drake.tracking.guided_config import GuidedConfig, IlqrConfig, StretchConfig
 from loco_drake.tracking.joining import near_of
@@ -79,6 +81,33 @@ def test_a_policy_that_falls_at_once_has_no_law(plans, near):
     with torch.no_grad():
         wild.layers[-1].bias += 20.0
     assert find_law(plans, wild, config(1).environment, SHORT, (0, 0, 1)) is None
+
+
+def test_a_push_changes_the_velocity_at_the_start(plans, near):
+    still = ResetNoise(joints=0, velocities=0, position=0, heading=0)
+    world = replace(config(1).environment, reset_noise=still)
+    pushed = replace(SHORT, lead_share=0.0, push=(0.5, 0.7))
+    found = find_law(plans, near, world, pushed, (0, 0, 3))
+    change = found.law.states[0] - plans[found.plan].state[found.sample]
+    velocity = split(change)[1][VELOCITY]
+    assert velocity[2] == 0
+    assert 0.5 <= np.linalg.norm(velocity) <= 0.7
+    change[22:25] = 0
+    assert not change.any()
+
+
+def test_what_a_push_throws_is_saved_and_goes_on(plans, near):
+    hard = replace(SHORT, length=50, lead_share=0.0, push=(1.6, 1.6))
+    world = config(1).environment
+    lost = find_law(plans, near, world, replace(hard, rescues=0), (0, 0, 6))
+    assert lost is None
+    saved = find_law(plans, near, world, hard, (0, 0, 6))
+    assert len(saved.law) == 46
+    plan, row = plans[saved.plan], saved.sample
+    problem = TrackingProblem(plan, world)
+    rewards = problem.rewards(row + 1, saved.law.states[1:])
+    assert saved.before < 0.4
+    assert rewards[-5:].mean() > 0.6  # it comes back to its plan
 
 
 def test_law_files_hold_32_bits(found, tmp_path):
@@ -167,6 +196,16 @@ def test_it_learns(trained):
         assert same != name.startswith("layers."), name
 
 
+def test_the_network_that_acts_far_away_learns(plans, tmp_path):
+    far = config(1, learns="far", stretch=replace(SHORT, push=(0.5, 1.0)))
+    train_guided(plans, START, far, tmp_path)
+    start, _ = read_actor(START)
+    now, _ = read_actor(tmp_path / "policy.safetensors")
+    for name, value in now.state_dict().items():
+        same = torch.equal(value, start.state_dict()[name])
+        assert same != name.startswith("recovery."), name
+
+
 class Interrupted(Local):
     """Is stopped after the first stretch."""
 
@@ -209,7 +248,7 @@ def test_laws_that_are_gone_or_half_written(trained, plans, tmp_path):
         train_guided(plans, None, config(2), folder, resume=True)
 
 
-def test_what_cannot_be_trained(plans, tmp_path):
+def test_what_cannot_be_trained(plans, near, tmp_path):
     student = pretrained_path("policy_go2_unprivileged")
     with pytest.raises(InputError, match="has a memory, and learns no laws"):
         train_guided(plans, student, config(1), tmp_path / "a")
@@ -224,4 +263,16 @@ def test_what_cannot_be_trained(plans, tmp_path):
         train_guided(
             plans, START, config(1, stretch=replace(SHORT, length=20)), tmp_path / "a"
         )
+    single = tmp_path / "near.safetensors"
+    save_actor(near, single)
+    with pytest.raises(InputError, match="no second network, far from the plan"):
+        train_guided(plans, single, config(1, learns="far"), tmp_path / "a")
+    for push, message in (
+        ((-1.0, 1.0), "push must be 0 or more"),
+        ((2.0, 1.0), "push must be 2 or more and at most 5, not 1"),
+        ((1.0, np.inf), "push must be 1 or more and at most 5, not inf"),
+    ):
+        pushed = config(1, stretch=replace(SHORT, push=push))
+        with pytest.raises(InputError, match=message):
+            train_guided(plans, START, pushed, tmp_path / "a")
     assert not (tmp_path / "a").exists()
