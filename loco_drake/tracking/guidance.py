@@ -82,9 +82,8 @@ def find_law(
     """
     random = np.random.default_rng(seed)
     number = int(random.integers(len(plans)))
-    lead = int(random.integers(config.lead + 1) * (random.random() < config.lead_share))
     length = len(plans[number])
-    first = int(random.integers(max(1, length - config.length - lead - 2)))
+    first, lead = config.draw(random, length)
     batch = TrackingBatch([plans[number]], environment, 1)
     batch.reset(0, random, 0, first)
     problem = TrackingProblem(plans[number], environment)
@@ -92,9 +91,7 @@ def find_law(
     if len(taken) < lead:
         return None
     previous = taken[-1] if lead else np.zeros(problem.joints)
-    if max(config.push):
-        speed, angle = random.uniform(*config.push), random.uniform(-np.pi, np.pi)
-        batch.push(0, speed * np.array([np.cos(angle), np.sin(angle), 0.0]))
+    batch.push(0, config.draw_push(random))
     start = first + lead
     whole = min(config.length, length - start - 2)
     visited, taken = track(batch, actor, whole)

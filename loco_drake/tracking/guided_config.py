@@ -3,8 +3,10 @@
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+import numpy as np
 import tyro
 
+from loco_drake.common.arrays import Array
 from loco_drake.common.errors import check_at_least, check_bounds
 from loco_drake.control.state import TerminationConfig
 from loco_drake.models.plant import PlantConfig
@@ -49,6 +51,21 @@ class StretchConfig:
     # Iterative LQR: one linearization, since the policy comes back with another motion.
     ilqr: IlqrConfig = field(default_factory=lambda: IlqrConfig(iterations=1))
 
+    def draw(self, random: np.random.Generator, length: int) -> tuple[int, int]:
+        """Returns where in a plan of ``length`` samples a stretch begins, and its lead.
+
+        The lead, in control periods, comes after that sample.
+        """
+        lead = int(random.integers(self.lead + 1) * (random.random() < self.lead_share))
+        return int(random.integers(max(1, length - self.length - lead - 2))), lead
+
+    def draw_push(self, random: np.random.Generator) -> Array:
+        """Returns the change of the base's velocity v_WB by a push, m/s."""
+        if not max(self.push):
+            return np.zeros(3)
+        speed, angle = random.uniform(*self.push), random.uniform(-np.pi, np.pi)
+        return speed * np.array([np.cos(angle), np.sin(angle), 0.0])
+
     def check(self) -> None:
         """Raises InputError unless laws can be found."""
         check_at_least("stretch.length", self.length, FEWEST + self.tail)
@@ -86,6 +103,10 @@ class GuidedConfig:
     learning_rate: float = 7e-4
     # Network that learns: of two, the one that acts near the plan or far from it.
     learns: Literal["near", "far"] = "near"
+    # Weight of staying as it is where it gets to, by itself; 0 lets it forget.
+    keep: float = 0.0
+    # Stretches on which it is seen where that is.
+    kept_stretches: int = 1500
     # Samples that are kept to learn from.
     capacity: int = 120_000
     # Where laws are found.
@@ -117,6 +138,8 @@ class GuidedConfig:
         for name in ("stretches", "workers", "updates", "minibatch", "capacity"):
             check_at_least(name, getattr(self, name), 1)
         check_at_least("seed", self.seed, 0)
+        check_bounds("--keep", self.keep, 0)
+        check_at_least("kept_stretches", self.kept_stretches, 1)
         check_bounds("--learning-rate", self.learning_rate, 0, 1, above=True)
         self.stretch.check()
         self.environment.check()

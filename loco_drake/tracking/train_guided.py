@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import math
 import shutil
 import time
 from collections.abc import Mapping
@@ -12,7 +11,6 @@ from statistics import fmean
 from threading import Event
 from typing import Any
 
-import numpy as np
 import torch
 
 from loco_drake.common import run_folder
@@ -29,7 +27,8 @@ from loco_drake.models.robots import get_simulated
 from loco_drake.motion.gaits import ROW_LABELS
 from loco_drake.tracking.guidance import Found, find_laws
 from loco_drake.tracking.guided_config import FEWEST, GuidedConfig
-from loco_drake.tracking.laws import Laws, law_loss, load_found, save_found
+from loco_drake.tracking.law_learning import learn_laws
+from loco_drake.tracking.laws import Laws, load_found, save_found
 from loco_drake.tracking.learning_curve import PROGRESS
 from loco_drake.tracking.train import POLICY, Report
 
@@ -149,7 +148,7 @@ def train_guided(
                     "No law was found: the policy loses every stretch at once, or no "
                     "actions are better; begin with another policy, in another folder."
                 )
-            loss = _learn(policy, laws, config, number)
+            loss = learn_laws(policy, laws, plans, config, number)
             seconds = seconds_before + time.monotonic() - start
             periods = rounds[-1]["steps"] if rounds else 0
             periods += sum(one.periods for one in found)
@@ -219,29 +218,6 @@ def _find(
             return None
     # As they are stored, whether or not the training was interrupted.
     return [load_found(path) for path in _files(into)]
-
-
-def _learn(policy: Actor, laws: Laws, config: GuidedConfig, number: int) -> float:
-    """Learns the laws; returns the mean loss of the last tenth of the updates."""
-    random = np.random.default_rng((config.seed, number))
-    # What acts far from the plan has learned more worlds than the model's, and forgets
-    # them where there are few laws.
-    learner = policy.layers if config.learns == "near" else policy.recovery
-    learner.requires_grad_(True)
-    optimizer = torch.optim.Adam(learner.parameters(), lr=config.learning_rate)
-    losses = []
-    for update in range(config.updates):
-        for group in optimizer.param_groups:
-            share = (1 + math.cos(math.pi * update / config.updates)) / 2
-            group["lr"] = config.learning_rate * share
-        seen, told, weights = laws.draw(random, config.minibatch)
-        loss = law_loss(policy(seen), told, weights)
-        optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
-        optimizer.step()
-        losses.append(loss.item())
-    learner.requires_grad_(False)
-    return fmean(losses[-math.ceil(len(losses) / 10) :])
 
 
 def _returns(

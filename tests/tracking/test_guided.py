@@ -21,9 +21,11 @@ from loco_drake.tracking.config import ResetNoise
 from loco_drake.tracking.guidance import find_law
 from loco_drake.tracking.guided_config import GuidedConfig, IlqrConfig, StretchConfig
 from loco_drake.tracking.joining import near_of
+from loco_drake.tracking.law_learning import learn_laws
 from loco_drake.tracking.laws import Laws, law_loss, load_found, save_found
 from loco_drake.tracking.problem import TrackingProblem
 from loco_drake.tracking.train_guided import train_guided
+from loco_drake.tracking.visited import visit
 
 START = pretrained_path("policy_go2")
 SHORT = StretchConfig(length=34, tail=4, lead=3, ilqr=IlqrConfig(iterations=1, steps=1))
@@ -206,6 +208,23 @@ def test_the_network_that_acts_far_away_learns(plans, tmp_path):
         assert same != name.startswith("recovery."), name
 
 
+def test_a_policy_keeps_what_it_does_where_it_gets_to(plans, found):
+    far = {"learns": "far", "stretch": replace(SHORT, lead_share=0.5, push=(0.6, 0.6))}
+    changes = []
+    for keep in (0.0, 100.0):
+        options = config(1, keep=keep, kept_stretches=3, updates=60, **far)
+        policy = load_actor(START, get_robot("go2")).requires_grad_(False)
+        laws = Laws(get_robot("go2"), plans, 1000)
+        laws.add(found)
+        random = np.random.default_rng((0, 0, 1))
+        seen = visit(plans, policy, options.environment, options.stretch, random, 3)
+        assert 34 < len(seen) <= 3 * 34
+        before = policy(seen)
+        learn_laws(policy, laws, plans, options, 0)
+        changes.append(float((policy(seen) - before).square().mean()))
+    assert changes[1] < changes[0] / 4
+
+
 class Interrupted(Local):
     """Is stopped after the first stretch."""
 
@@ -267,6 +286,8 @@ def test_what_cannot_be_trained(plans, near, tmp_path):
     save_actor(near, single)
     with pytest.raises(InputError, match="no second network, far from the plan"):
         train_guided(plans, single, config(1, learns="far"), tmp_path / "a")
+    with pytest.raises(InputError, match="--keep must be 0 or more"):
+        train_guided(plans, START, config(1, keep=-1.0), tmp_path / "a")
     for push, message in (
         ((-1.0, 1.0), "push must be 0 or more"),
         ((2.0, 1.0), "push must be 2 or more and at most 5, not 1"),
