@@ -131,6 +131,11 @@ class Actuation(DomainSystem):
         surplus = surplus_inertia(self._robot, self._plant)
         return self._robot.reflected_inertia - (1 - damping) * surplus
 
+    def SetPast(self, context: Context, q_d: Array) -> None:
+        """Sets all set-points that ``context``, this system's own, remembers, (J,)."""
+        past = context.get_mutable_discrete_state(self._past)
+        past.SetFromVector(np.tile(q_d, past.size() // self._joints))
+
     def _remember(self, context: Context, values: DiscreteValues) -> None:
         if self._domain(context).latency == 0:
             return

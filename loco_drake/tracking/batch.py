@@ -96,9 +96,15 @@ class TrackingBatch:
     def place(self, i: int, sample: int, state: Array, action: Array) -> None:
         """Puts robot ``i`` at a sample of its plan, in a state, after an action.
 
-        Its world must be the model's, which has no memory.
+        Its motors forget what was before.
         """
         self.sample[i], self._state[i], self._action[i] = sample, state, action
+        self._worlds[i].begin(self._domains[i], sample)
+
+    def drawn(self, i: int) -> Domain | None:
+        """Returns the world that was drawn for robot ``i``; None if it is the model."""
+        changed = self._config.randomization.changes_physics
+        return self._domains[i] if changed else None
 
     def push(self, i: int, v_W: Array) -> None:
         """Adds ``v_W``, m/s, to the velocity of robot ``i``'s base."""

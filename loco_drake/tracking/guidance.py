@@ -86,7 +86,7 @@ def find_law(
     first, lead = config.draw(random, length)
     batch = TrackingBatch([plans[number]], environment, 1)
     batch.reset(0, random, 0, first)
-    problem = TrackingProblem(plans[number], environment)
+    problem = TrackingProblem(plans[number], environment, batch.drawn(0))
     _, taken = track(batch, actor, lead)
     if len(taken) < lead:
         return None

@@ -7,10 +7,12 @@ import numpy as np
 import tyro
 
 from loco_drake.common.arrays import Array
-from loco_drake.common.errors import check_at_least, check_bounds
+from loco_drake.common.errors import InputError, check_at_least, check_bounds
+from loco_drake.control.plan import PLAN_DT
 from loco_drake.control.state import TerminationConfig
 from loco_drake.models.plant import PlantConfig
 from loco_drake.tracking.config import EnvironmentConfig, ResetNoise
+from loco_drake.tracking.randomization import RandomizationConfig
 
 FEWEST = 25  # samples of a law
 
@@ -122,15 +124,18 @@ class GuidedConfig:
     )
     # Standard deviations of the initial state about the plan.
     reset_noise: ResetNoise = field(default_factory=ResetNoise)
+    # Domain randomization: worlds in which laws are found; a range is two numbers.
+    randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
 
     @property
     def environment(self) -> EnvironmentConfig:
-        """The world in which laws are found: the model's."""
+        """The world in which laws are found."""
         return EnvironmentConfig(
             robot=self.robot,
             plant=self.plant,
             termination=self.termination,
             reset_noise=self.reset_noise,
+            randomization=self.randomization,
         )
 
     def check(self) -> None:
@@ -143,3 +148,14 @@ class GuidedConfig:
         check_bounds("--learning-rate", self.learning_rate, 0, 1, above=True)
         self.stretch.check()
         self.environment.check()
+        for name in ("push", "noise", "slope", "roughness"):
+            if getattr(self.randomization, name) is not None:
+                raise InputError(
+                    f"Laws are found in worlds without {name}: leave out "
+                    f"--randomization.{name}."
+                )
+        if (self.randomization.latency or (0.0,))[-1] > PLAN_DT:
+            raise InputError(
+                f"Laws are found for a latency of at most {PLAN_DT:g} s: lower "
+                "--randomization.latency."
+            )

@@ -86,10 +86,10 @@ class Ilqr:
         law = FeedbackLaw(states, actions, previous, none, none, cost, reward)
         damping = _DAMPING
         for _ in range(self._config.iterations):
-            pairs = zip(law.states[:-1], law.actions, strict=True)
+            taken = zip(law.states[:-1], law.actions, law.before(), strict=True)
             linear = [
-                self._problem.linearize(first + t + 1, x, u)
-                for t, (x, u) in enumerate(pairs)
+                self._problem.linearize(first + t + 1, *where)
+                for t, where in enumerate(taken)
             ]
             start = law
             for k in range(self._config.steps):
@@ -134,8 +134,8 @@ class Ilqr:
             off = np.append(change_between(law.states[t], state), action - before)
             change = steps[t] + law.gains[t] @ off
             change = np.clip(change, -_LARGEST_CHANGE, _LARGEST_CHANGE)
-            action = law.actions[t] + change
-            state = self._problem.next_state(first + t + 1, state, action)
+            last, action = action, law.actions[t] + change
+            state = self._problem.next_state(first + t + 1, state, action, last)
             if not np.isfinite(state).all() or self._problem.is_fallen(state):
                 return None
             states.append(state)
@@ -154,7 +154,7 @@ class Ilqr:
         """
         states, actions, before = law.states, law.actions, law.before()
         T, joints = actions.shape
-        n = linear[0][0].shape[0]
+        n = len(linear[0][0])
         eye = np.eye(joints)
         effort, change = (
             2 * cost / joints * eye
@@ -167,7 +167,7 @@ class Ilqr:
         curvatures = np.empty((T, joints, joints))
         for t in reversed(range(T)):
             A = np.zeros_like(V)
-            A[:n, :n] = linear[t][0]
+            A[:n] = linear[t][0]
             B = np.vstack((linear[t][1], eye))
             drift = change @ (actions[t] - before[t])
             Q_x, Q_u = A.T @ v, B.T @ v + effort @ actions[t] + drift

@@ -63,7 +63,30 @@ class _Simulation:
         return np.asarray(self._plant.GetPositionsAndVelocities(self._plant_context))
 
 
-class SharedWorld(_Simulation):
+class _Periods(_Simulation):
+    """One control period, as a function of the state and the targets."""
+
+    def __init__(self, config: EnvironmentConfig, disturbances: Disturbances) -> None:
+        super().__init__(config, disturbances)
+        # The clock may continue if plant steps and control periods coincide exactly at
+        # any time. An integrator must be reset for each robot.
+        steps = PLAN_DT / config.plant.time_step
+        power_of_2 = steps >= 1 and math.frexp(steps)[0] == 0.5
+        self._runs_on = power_of_2 and config.plant.contact != "cenic"
+        self._periods = 0
+        self._simulator.Initialize()
+
+    def _advance_period(self, state: Array, desired_state: Array) -> Array:
+        self._set(state, desired_state)
+        if not self._runs_on:
+            self._periods = 0
+            self._context.SetTime(0.0)
+            self._simulator.Initialize()
+        self._periods += 1
+        return self._advance(self._periods * PLAN_DT)
+
+
+class SharedWorld(_Periods):
     """One control period of a robot, as a function of its state and its targets.
 
     [q, v] is the entire state of the diagram, and the plant does not depend on time, so
@@ -73,13 +96,6 @@ class SharedWorld(_Simulation):
 
     def __init__(self, config: EnvironmentConfig) -> None:
         super().__init__(config, Disturbances())
-        # The clock may continue if plant steps and control periods coincide exactly at
-        # any time. An integrator must be reset for each robot.
-        steps = PLAN_DT / config.plant.time_step
-        power_of_2 = steps >= 1 and math.frexp(steps)[0] == 0.5
-        self._runs_on = power_of_2 and config.plant.contact != "cenic"
-        self._periods = 0
-        self._simulator.Initialize()
 
     def begin(self, domain: Domain, sample: int) -> None:
         """Does nothing, since every episode's world is the model's."""
@@ -89,13 +105,34 @@ class SharedWorld(_Simulation):
 
         The PD's desired state is [q_d, v_d], shape (2 J,).
         """
-        self._set(state, desired_state)
-        if not self._runs_on:
-            self._periods = 0
-            self._context.SetTime(0.0)
-            self._simulator.Initialize()
-        self._periods += 1
-        return self._advance(self._periods * PLAN_DT)
+        return self._advance_period(state, desired_state)
+
+
+class DrawnWorld(_Periods):
+    """One control period in a world that was drawn, without pushes and terrain.
+
+    Motors delay set-points by one control period at most, so the state after it is a
+    function of the state and the targets before, the present and the last ones.
+    """
+
+    def __init__(self, config: EnvironmentConfig, domain: Domain) -> None:
+        super().__init__(
+            config, replace(config.randomization.disturbances, sensors=False)
+        )
+        SetDomain(self._diagram, self._context, replace(domain, sensors=None))
+        self.delays = domain.latency > 0
+        if self.delays:
+            self._actuation = self._diagram.GetSubsystemByName("actuation")
+            self._motors = self._actuation.GetMyMutableContextFromRoot(self._context)
+
+    def advance(self, state: Array, desired_state: Array, before: Array) -> Array:
+        """Returns the state after a control period; see :class:`SharedWorld`.
+
+        ``before`` (2 J,) is the desired state of the period before.
+        """
+        if self.delays:
+            self._actuation.SetPast(self._motors, before[: len(before) // 2])
+        return self._advance_period(state, desired_state)
 
 
 class OwnWorld(_Simulation):

@@ -4,13 +4,14 @@ import numpy as np
 
 from loco_drake.common.arrays import Array
 from loco_drake.control.action import joint_targets, set_points
+from loco_drake.control.domain import Domain
 from loco_drake.control.plan import Plan
 from loco_drake.control.reward import REWARD_WEIGHTS, reward_residuals
 from loco_drake.control.state import has_fallen, split, unit_base
 from loco_drake.control.state_change import change_between, changed
 from loco_drake.models.robots import get_simulated
 from loco_drake.tracking.config import EnvironmentConfig
-from loco_drake.tracking.physics import SharedWorld
+from loco_drake.tracking.physics import DrawnWorld, SharedWorld
 
 # Half a difference in each of a change's parts: base rotation and translation, joints,
 # angular velocity and velocity of the base, and joint velocities; rad, m, s. A contact
@@ -26,52 +27,75 @@ class TrackingProblem:
     """The physics of one control period, and what a state costs, along a plan.
 
     The cost of a state is 1 minus its reward. Changes of states are as in
-    :mod:`.state_change`, n = 12 + 2 J.
+    :mod:`.state_change`, n = 12 + 2 J. The world is ``domain``, without its pushes and
+    terrain, or the model's.
     """
 
-    def __init__(self, plan: Plan, config: EnvironmentConfig) -> None:
+    def __init__(
+        self, plan: Plan, config: EnvironmentConfig, domain: Domain | None = None
+    ) -> None:
         robot = get_simulated(config.robot)
         self._robot, self._plan = robot, plan
-        self._world = SharedWorld(config)
+        self._world = (
+            SharedWorld(config) if domain is None else DrawnWorld(config, domain)
+        )
         self._set_points = set_points(robot, plan)
         joints = len(robot.joint_names)
         self._steps = np.repeat(_STEPS, (3, 3, joints, 3, 3, joints))
         self.joints = joints
         self.periods = 0  # simulated so far
 
-    def next_state(self, sample: int, state: Array, action: Array) -> Array:
-        """Returns the state at ``sample`` after that at the sample before."""
+    def next_state(
+        self, sample: int, state: Array, action: Array, before: Array
+    ) -> Array:
+        """Returns the state at ``sample`` after that at the sample before.
+
+        ``before`` is the action before ``action``, both of shape (J,).
+        """
         self.periods += 1
         desired = joint_targets(self._set_points[sample], action)
-        after: Array = unit_base(self._world.advance(state, desired)[None])[0]
-        return after
+        if isinstance(self._world, DrawnWorld):
+            last = joint_targets(self._set_points[sample - 1], before)
+            after = self._world.advance(state, desired, last)
+        else:
+            after = self._world.advance(state, desired)
+        result: Array = unit_base(after[None])[0]
+        return result
 
     def is_fallen(self, state: Array) -> bool:
         """Says whether the robot has fallen, see :func:`has_fallen`."""
         return bool(has_fallen(self._robot, split(state)[0]))
 
     def linearize(
-        self, sample: int, state: Array, action: Array
+        self, sample: int, state: Array, action: Array, before: Array
     ) -> tuple[Array, Array]:
-        """Returns A (n, n) and B (n, J) of the change at ``sample``.
+        """Returns A (n, n + J) and B (n, J) of the change at ``sample``.
 
-        They are central differences about the state before and the action.
+        A is about the state before, and about the action before that counts where
+        motors delay it. They are central differences.
         """
-        steps = np.append(self._steps, np.full(self.joints, _ACTION_STEP))
-        columns = np.empty((len(self._steps), len(steps)))
+        n, joints = len(self._steps), self.joints
+        delays = isinstance(self._world, DrawnWorld) and self._world.delays
+        steps = np.concatenate((self._steps, np.full(2 * joints, _ACTION_STEP)))
+        columns = np.zeros((n, len(steps)))
         for i, step in enumerate(steps):
+            if n + joints <= i and not delays:
+                break
             change = np.zeros(len(steps))
             change[i] = step
+            of_state, of_action, of_before = np.split(change, (n, n + joints))
             low, high = (
                 self.next_state(
                     sample,
-                    changed(state, side * change[: len(self._steps)]),
-                    action + side * change[len(self._steps) :],
+                    changed(state, side * of_state),
+                    action + side * of_action,
+                    before + side * of_before,
                 )
                 for side in (-1, 1)
             )
             columns[:, i] = change_between(low, high) / (2 * step)
-        return columns[:, : len(self._steps)], columns[:, len(self._steps) :]
+        A, B, C = np.split(columns, (n, n + joints), axis=1)
+        return np.hstack((A, C)), B
 
     def rewards(self, first: int, states: Array) -> Array:
         """Returns the rewards (T,) of states (T, 13 + 2 J), the first at ``first``."""

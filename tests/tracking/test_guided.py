@@ -64,8 +64,9 @@ def test_a_law_costs_less_and_leads_where_it_says(found, plans):
     assert found.law.reward > found.before
     problem = TrackingProblem(plans[found.plan], config(1).environment)
     state = found.law.states[0]
-    for t, action in enumerate(found.law.actions):
-        state = problem.next_state(found.sample + t + 1, state, action)
+    for t, before in enumerate(found.law.before()):
+        action = found.law.actions[t]
+        state = problem.next_state(found.sample + t + 1, state, action, before)
         assert (state == found.law.states[t + 1]).all()
     eigenvalues = np.linalg.eigvalsh(found.law.curvatures)
     assert (eigenvalues > 0).all()

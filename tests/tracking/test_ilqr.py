@@ -20,9 +20,10 @@ def problem(trot):
 
 
 def rollout(problem, state, actions, first=0):
-    states = [state]
+    states, before = [state], np.zeros(problem.joints)
     for t, action in enumerate(actions):
-        states.append(problem.next_state(first + t + 1, states[-1], action))
+        states.append(problem.next_state(first + t + 1, states[-1], action, before))
+        before = action
     return np.array(states)
 
 
@@ -41,15 +42,15 @@ class Linear:
         self.still = np.append([1.0], np.zeros(n))
         self.still[6] = 1.0
 
-    def next_state(self, sample, state, action):
+    def next_state(self, sample, state, action, before):
         change = self.A @ change_between(self.still, state) + self.B @ action
         return changed(self.still, change)
 
     def is_fallen(self, state):
         return False
 
-    def linearize(self, sample, state, action):
-        return self.A, self.B
+    def linearize(self, sample, state, action, before):
+        return np.hstack((self.A, np.zeros_like(self.B))), self.B
 
     def rewards(self, first, states):
         return 1 - np.square(change_between(self.still, states)).sum(axis=-1) / 2
@@ -127,8 +128,8 @@ def test_law_improves_a_trot_and_returns_to_it(problem, trot):
     moved = []
     for t, before in enumerate(law.before()):
         off = np.append(change_between(law.states[t], state), action - before)
-        action = law.actions[t] + law.gains[t] @ off
-        state = problem.next_state(first + t + 1, state, action)
+        last, action = action, law.actions[t] + law.gains[t] @ off
+        state = problem.next_state(first + t + 1, state, action, last)
         moved.append(state)
     held = rollout(problem, changed(start, shift), law.actions, first)[1:]
     with_gains, without = (
