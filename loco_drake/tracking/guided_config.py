@@ -47,7 +47,7 @@ class StretchConfig:
     # Share of the stretches that have a lead; the others start beside the plan.
     lead_share: float = 0.25
     # Speed of a push at the beginning, in any direction, m/s: least and largest.
-    push: tuple[float, float] = (0.0, 0.0)
+    push: Annotated[tuple[float, float], tyro.conf.arg(metavar="LOW HIGH")] = (0.0, 0.0)
     # How often a stretch that the policy loses is improved before the policy goes on.
     rescues: int = 3
     # Iterative LQR: one linearization, since the policy comes back with another motion.
@@ -104,7 +104,9 @@ class GuidedConfig:
     # Learning rate: the initial one of a round, which decays to 0 as a half cosine.
     learning_rate: float = 7e-4
     # Network that learns: of two, the one that acts near the plan or far from it.
-    learns: Literal["near", "far"] = "near"
+    learns: Annotated[Literal["near", "far"], tyro.conf.arg(metavar="near|far")] = (
+        "near"
+    )
     # Weight of staying as it is where it gets to, by itself; 0 lets it forget.
     keep: float = 0.0
     # Stretches on which it is seen where that is.
