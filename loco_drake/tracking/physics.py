@@ -63,10 +63,19 @@ class _Simulation:
         return np.asarray(self._plant.GetPositionsAndVelocities(self._plant_context))
 
 
-class _Periods(_Simulation):
-    """One control period, as a function of the state and the targets."""
+class SharedWorld(_Simulation):
+    """One control period of a robot, as a function of its state and its targets.
 
-    def __init__(self, config: EnvironmentConfig, disturbances: Disturbances) -> None:
+    [q, v] is the entire state of the diagram, and the plant does not depend on time, so
+    one Context serves all robots. Separate Contexts would evict each other from the
+    processor's caches. A domain may be given, without pushes and terrain; where its
+    motors delay set-points, by one period at most, the targets before count, too.
+    """
+
+    def __init__(self, config: EnvironmentConfig, domain: Domain | None = None) -> None:
+        disturbances = Disturbances()
+        if domain is not None:
+            disturbances = replace(config.randomization.disturbances, sensors=False)
         super().__init__(config, disturbances)
         # The clock may continue if plant steps and control periods coincide exactly at
         # any time. An integrator must be reset for each robot.
@@ -75,8 +84,26 @@ class _Periods(_Simulation):
         self._runs_on = power_of_2 and config.plant.contact != "cenic"
         self._periods = 0
         self._simulator.Initialize()
+        self.delays = domain is not None and domain.latency > 0
+        if domain is not None:
+            SetDomain(self._diagram, self._context, replace(domain, sensors=None))
+        if self.delays:
+            self._actuation = self._diagram.GetSubsystemByName("actuation")
+            self._motors = self._actuation.GetMyMutableContextFromRoot(self._context)
 
-    def _advance_period(self, state: Array, desired_state: Array) -> Array:
+    def begin(self, domain: Domain, sample: int) -> None:
+        """Does nothing, since every episode's world is the model's."""
+
+    def advance(
+        self, state: Array, desired_state: Array, before: Array | None = None
+    ) -> Array:
+        """Returns the state [q, v], (13 + 2 J,), one control period after ``state``.
+
+        The PD's desired state is [q_d, v_d], shape (2 J,). ``before`` is that of the
+        period before, if ``delays``.
+        """
+        if before is not None:
+            self._actuation.SetPast(self._motors, before[: len(before) // 2])
         self._set(state, desired_state)
         if not self._runs_on:
             self._periods = 0
@@ -84,55 +111,6 @@ class _Periods(_Simulation):
             self._simulator.Initialize()
         self._periods += 1
         return self._advance(self._periods * PLAN_DT)
-
-
-class SharedWorld(_Periods):
-    """One control period of a robot, as a function of its state and its targets.
-
-    [q, v] is the entire state of the diagram, and the plant does not depend on time, so
-    one Context serves all robots. Separate Contexts would evict each other from the
-    processor's caches.
-    """
-
-    def __init__(self, config: EnvironmentConfig) -> None:
-        super().__init__(config, Disturbances())
-
-    def begin(self, domain: Domain, sample: int) -> None:
-        """Does nothing, since every episode's world is the model's."""
-
-    def advance(self, state: Array, desired_state: Array) -> Array:
-        """Returns the state [q, v], (13 + 2 J,), one control period after ``state``.
-
-        The PD's desired state is [q_d, v_d], shape (2 J,).
-        """
-        return self._advance_period(state, desired_state)
-
-
-class DrawnWorld(_Periods):
-    """One control period in a world that was drawn, without pushes and terrain.
-
-    Motors delay set-points by one control period at most, so the state after it is a
-    function of the state and the targets before, the present and the last ones.
-    """
-
-    def __init__(self, config: EnvironmentConfig, domain: Domain) -> None:
-        super().__init__(
-            config, replace(config.randomization.disturbances, sensors=False)
-        )
-        SetDomain(self._diagram, self._context, replace(domain, sensors=None))
-        self.delays = domain.latency > 0
-        if self.delays:
-            self._actuation = self._diagram.GetSubsystemByName("actuation")
-            self._motors = self._actuation.GetMyMutableContextFromRoot(self._context)
-
-    def advance(self, state: Array, desired_state: Array, before: Array) -> Array:
-        """Returns the state after a control period; see :class:`SharedWorld`.
-
-        ``before`` (2 J,) is the desired state of the period before.
-        """
-        if self.delays:
-            self._actuation.SetPast(self._motors, before[: len(before) // 2])
-        return self._advance_period(state, desired_state)
 
 
 class OwnWorld(_Simulation):

@@ -11,7 +11,7 @@ from loco_drake.control.state import has_fallen, split, unit_base
 from loco_drake.control.state_change import change_between, changed
 from loco_drake.models.robots import get_simulated
 from loco_drake.tracking.config import EnvironmentConfig
-from loco_drake.tracking.physics import DrawnWorld, SharedWorld
+from loco_drake.tracking.physics import SharedWorld
 
 # Half a difference in each of a change's parts: base rotation and translation, joints,
 # angular velocity and velocity of the base, and joint velocities; rad, m, s. A contact
@@ -36,9 +36,7 @@ class TrackingProblem:
     ) -> None:
         robot = get_simulated(config.robot)
         self._robot, self._plan = robot, plan
-        self._world = (
-            SharedWorld(config) if domain is None else DrawnWorld(config, domain)
-        )
+        self._world = SharedWorld(config, domain)
         self._set_points = set_points(robot, plan)
         joints = len(robot.joint_names)
         self._steps = np.repeat(_STEPS, (3, 3, joints, 3, 3, joints))
@@ -54,13 +52,11 @@ class TrackingProblem:
         """
         self.periods += 1
         desired = joint_targets(self._set_points[sample], action)
-        if isinstance(self._world, DrawnWorld):
+        last = None
+        if self._world.delays:
             last = joint_targets(self._set_points[sample - 1], before)
-            after = self._world.advance(state, desired, last)
-        else:
-            after = self._world.advance(state, desired)
-        result: Array = unit_base(after[None])[0]
-        return result
+        after: Array = unit_base(self._world.advance(state, desired, last)[None])[0]
+        return after
 
     def is_fallen(self, state: Array) -> bool:
         """Says whether the robot has fallen, see :func:`has_fallen`."""
@@ -75,11 +71,10 @@ class TrackingProblem:
         motors delay it. They are central differences.
         """
         n, joints = len(self._steps), self.joints
-        delays = isinstance(self._world, DrawnWorld) and self._world.delays
         steps = np.concatenate((self._steps, np.full(2 * joints, _ACTION_STEP)))
         columns = np.zeros((n, len(steps)))
         for i, step in enumerate(steps):
-            if n + joints <= i and not delays:
+            if n + joints <= i and not self._world.delays:
                 break
             change = np.zeros(len(steps))
             change[i] = step
